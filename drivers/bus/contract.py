@@ -1,0 +1,71 @@
+"""What every CAN back end offers: the bus contract.
+
+A frame on the hot path is no object: it is ``(can_id, data, timestamp_s)``. ``can_id`` is the 11-bit identifier with the
+flags of SocketCAN above it (:data:`RTR_FLAG` for a remote frame, whose ``data`` is empty). Timestamps are seconds on the
+running loop's clock (``loop.time()``).
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+
+RTR_FLAG = 0x4000_0000
+ID_MASK = 0x7FF
+
+FrameHandler = Callable[[int, bytes, float], None]
+
+
+@dataclass(slots=True)
+class BusCounters:
+    """What went over one interface since it was opened."""
+
+    received: int = 0
+    sent: int = 0
+    dropped_stale: int = 0
+    """Frames whose deadline had passed before they reached the wire: dropped, never sent late."""
+    dropped_full: int = 0
+    """Frames refused because the transmit queue was full."""
+
+
+class Bus(ABC):
+    """One CAN interface.
+
+    Attributes:
+        name: the interface's name as it stands in logs (``vcan0``).
+        bit_rate: bit/s.
+        receiver: called with every frame that another participant sent; set by the one owner of the interface.
+        taps: called with every frame, received or sent by this interface, in wire order (recorder, monitor).
+        counters: what went over the interface.
+    """
+
+    def __init__(self, name: str, bit_rate: int) -> None:
+        self.name = name
+        self.bit_rate = bit_rate
+        self.receiver: FrameHandler | None = None
+        self.taps: list[FrameHandler] = []
+        self.counters = BusCounters()
+
+    @abstractmethod
+    async def open(self) -> None:
+        """Open the interface on the running loop. Raises BusOff where it is down or missing."""
+
+    @abstractmethod
+    def send(self, can_id: int, data: bytes = b"", deadline_s: float = math.inf) -> None:
+        """Queue one frame for sending; returns at once and never blocks.
+
+        Args:
+            can_id: 11-bit identifier, with :data:`RTR_FLAG` for a remote frame.
+            data: 0 to 8 bytes.
+            deadline_s: loop time after which the frame is worthless: it is then dropped and counted.
+        """
+
+    @abstractmethod
+    def load(self) -> float:
+        """Share of the last second that the wire was busy, 0 to 1."""
+
+    @abstractmethod
+    async def close(self) -> None:
+        """Close the interface; what is still queued is dropped."""

@@ -1,0 +1,139 @@
+"""Typed definitions: one entry per object, error code and bit, read by codec, simulator, command line and docs alike."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from enum import Enum
+
+
+class DataType(Enum):
+    """CANopen data types (CiA 301, 7.4): struct code and size in bits, 0 where the length varies."""
+
+    U8 = ("B", 8)
+    U16 = ("H", 16)
+    U32 = ("I", 32)
+    U64 = ("Q", 64)
+    I8 = ("b", 8)
+    I16 = ("h", 16)
+    I32 = ("i", 32)
+    VISIBLE_STRING = ("", 0)
+    DOMAIN = (" ", 0)
+
+    @property
+    def code(self) -> str:
+        """Format character of :mod:`struct`, empty or blank for types without a fixed length."""
+        return str(self.value[0])
+
+    @property
+    def bits(self) -> int:
+        """Size in bits, 0 where the length varies."""
+        return int(self.value[1])
+
+    def pack(self, value: int | str | bytes) -> bytes:
+        """Little-endian bytes of a value. Raises struct.error or TypeError for a value that does not fit."""
+        if self.bits:
+            return struct.pack("<" + self.code, value)
+        return value.encode("ascii") if isinstance(value, str) else bytes(value)  # type: ignore[arg-type]
+
+    def unpack(self, data: bytes) -> int | str | bytes:
+        """The value of little-endian bytes. Raises struct.error where the length is wrong."""
+        if self.bits:
+            return int(struct.unpack("<" + self.code, data)[0])
+        return data.decode("latin-1") if self is DataType.VISIBLE_STRING else data
+
+
+class Access(Enum):
+    """Access through SDO."""
+
+    RO = "ro"
+    WO = "wo"
+    RW = "rw"
+    CONST = "const"
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectDef:
+    """One entry (index and sub-index) of an object dictionary.
+
+    Attributes:
+        name: the field's term in snake_case, unique in its dictionary (``target_velocity``).
+        default: value after power-up, before what was stored; None where nothing is documented. For node-dependent
+            identifiers the default is the base, and ``plus_node_id`` is set.
+        low, high: limits beyond those of the type; None where not stated.
+        pdo: ``"rx"``, ``"tx"``, ``"rx-static"``, ``"tx-static"`` or ``""``.
+        firmware: ``"2011h"`` for the base firmware, ``"later"`` for objects to be probed before use.
+        meaning: what it is and does, one or two sentences.
+        cause, cure: for objects whose value tells of trouble: why, and what to do.
+        source: document and section.
+    """
+
+    index: int
+    sub: int
+    name: str
+    type: DataType
+    access: Access
+    meaning: str
+    default: int | str | None = None
+    plus_node_id: bool = False
+    unit: str = ""
+    low: int | None = None
+    high: int | None = None
+    pdo: str = ""
+    firmware: str = "2011h"
+    cause: str = ""
+    cure: str = ""
+    source: str = ""
+
+    @property
+    def address(self) -> str:
+        """The object as people write it: ``0x6041`` or ``0x2078/1``."""
+        return f"0x{self.index:04X}/{self.sub}" if self.sub else f"0x{self.index:04X}"
+
+    @property
+    def mapping(self) -> int:
+        """The 32-bit mapping entry of the object (CiA 301: index, sub-index, length in bits)."""
+        return self.index << 16 | self.sub << 8 | self.type.bits
+
+
+@dataclass(frozen=True, slots=True)
+class CodeDef:
+    """One code with its cause and cure: an EMCY code, an SDO abort code, an NMT state.
+
+    Attributes:
+        code: the number.
+        name: short name.
+        meaning: what it says, one sentence.
+        cause: what usually leads to it.
+        cure: what to do about it.
+        register: error register bits that come with an EMCY code, None where not documented.
+        reaction: ``"D"`` (power stage off at once) or ``"Q"`` (quick-stop ramp, then off) for faults of a drive, else ``""``.
+        source: document and section.
+    """
+
+    code: int
+    name: str
+    meaning: str
+    cause: str = ""
+    cure: str = ""
+    register: int | None = None
+    reaction: str = ""
+    source: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class BitDef:
+    """One bit of a status or control word.
+
+    Attributes:
+        bit: bit number.
+        name: short name in snake_case.
+        when_set, when_clear: what it says when 1 and when 0.
+        modes: mode of operation it holds for (``"1"``, ``"3"``, ``"6"``), empty for all.
+    """
+
+    bit: int
+    name: str
+    when_set: str
+    when_clear: str = ""
+    modes: str = ""
