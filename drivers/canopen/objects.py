@@ -137,3 +137,45 @@ class BitDef:
     when_set: str
     when_clear: str = ""
     modes: str = ""
+
+
+class ObjectTable:
+    """An object dictionary by address and by name.
+
+    Args:
+        objects: its entries; names and addresses are unique.
+    """
+
+    def __init__(self, objects: tuple[ObjectDef, ...]) -> None:
+        self.objects = objects
+        self.by_address = {(entry.index, entry.sub): entry for entry in objects}
+        self.by_name = {entry.name: entry for entry in objects}
+        self.indices = frozenset(entry.index for entry in objects)
+        if not len(objects) == len(self.by_address) == len(self.by_name):
+            raise ValueError("an object dictionary holds an address or a name twice")
+
+    def __getitem__(self, name: str) -> ObjectDef:
+        return self.by_name[name]
+
+    def at(self, index: int, sub: int) -> ObjectDef | None:
+        """The entry at an address, or None."""
+        return self.by_address.get((index, sub))
+
+    def find(self, text: str) -> ObjectDef | None:
+        """The entry that a person means: a name, ``0x6041``, ``6041h`` or ``0x2078/1``; None where there is none."""
+        if text in self.by_name:
+            return self.by_name[text]
+        address = parse_address(text)
+        return self.by_address.get(address) if address else None
+
+
+def parse_address(text: str) -> tuple[int, int] | None:
+    """Index and sub-index of ``0x2078/1``, ``0x2078:01`` or ``6041h``; None where the text is no address."""
+    index_text, _, sub_text = text.replace(":", "/").partition("/")
+    if index_text.lower().endswith("h"):
+        index_text = "0x" + index_text[:-1]
+    try:
+        index, sub = int(index_text, 16), int(sub_text or "0", 0 if sub_text.lower().startswith("0x") else 10)
+    except ValueError:
+        return None
+    return (index, sub) if 0 <= index <= 0xFFFF and 0 <= sub <= 0xFF else None
