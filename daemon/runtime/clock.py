@@ -1,0 +1,199 @@
+"""The one clock: virtual time for tests, demos and campaigns, and the ticker that paces the control cycle.
+
+Time is the running loop's ``time()``. On a :class:`VirtualTimeLoop` it starts at zero and jumps to the next timer as
+soon as nothing is ready, so a program runs as fast as the processor goes and the same way each time.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import collections
+import ctypes
+import heapq
+import os
+import time
+from collections.abc import Callable, Coroutine
+from concurrent.futures import Executor
+from contextvars import Context
+from typing import Any, TypeVar, TypeVarTuple, Unpack
+
+T = TypeVar("T")
+Ts = TypeVarTuple("Ts")
+
+
+class Deadlock(RuntimeError):
+    """Everything on a virtual-time loop waits for something that can no longer happen."""
+
+
+class VirtualTimeLoop(asyncio.BaseEventLoop):
+    """An event loop without a clock, sockets, signals and threads.
+
+    Timers run in the order of their times, and those of one time in the order in which they were set. The scheduler is
+    its own because asyncio's leaves the order of equal times open.
+    """
+
+    _ready: collections.deque[asyncio.Handle]
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._now_s = 0.0
+        self._timers: list[tuple[float, int, asyncio.TimerHandle]] = []
+        self._timers_set = 0
+
+    def time(self) -> float:
+        """Virtual time in seconds since the loop was made."""
+        return self._now_s
+
+    def call_at(
+        self, when: float, callback: Callable[[Unpack[Ts]], object], *args: *Ts, context: Context | None = None
+    ) -> asyncio.TimerHandle:
+        """Run ``callback(*args)`` at virtual time ``when``; a time that has passed means now."""
+        handle = asyncio.TimerHandle(when, callback, args, self, context)
+        self._timers_set += 1
+        heapq.heappush(self._timers, (when, self._timers_set, handle))
+        return handle
+
+    def run_in_executor(
+        self, executor: Executor | None, func: Callable[[Unpack[Ts]], T], *args: *Ts
+    ) -> asyncio.Future[T]:
+        """Refused: a thread takes real time, which would make the run depend on the machine."""
+        raise NotImplementedError("virtual time has no threads: run this on a real loop")
+
+    def close(self) -> None:
+        """Drop all timers and close the loop."""
+        super().close()
+        self._timers.clear()
+
+    def _run_once(self) -> None:
+        ready = self._ready
+        if not ready and not self._advance():
+            raise Deadlock("nothing is ready and no timer is set: what is awaited cannot happen any more")
+        for _ in range(len(ready)):
+            handle = ready.popleft()
+            if not handle._cancelled:
+                handle._run()
+
+    def _advance(self) -> bool:
+        """Jump to the next timer and make it and all others of that time ready; False where there is none."""
+        timers, ready = self._timers, self._ready
+        while timers and (timers[0][0] <= self._now_s or not ready):
+            when, _, handle = heapq.heappop(timers)
+            if not handle.cancelled():
+                ready.append(handle)
+                self._now_s = max(self._now_s, when)
+        return bool(ready)
+
+    def _write_to_self(self) -> None:
+        """What call_soon_threadsafe and signal handlers wake a sleeping loop with; this one never sleeps."""
+
+
+def run_virtual(coro: Coroutine[Any, Any, T]) -> T:
+    """Run a coroutine to its end on virtual time, as ``asyncio.run`` does in real time.
+
+    Raises:
+        Deadlock: the coroutine waits, and nothing is left that could wake it.
+    """
+    with asyncio.Runner(loop_factory=VirtualTimeLoop) as runner:
+        return runner.run(coro)
+
+
+class Ticker:
+    """Calls back once per period, at absolute deadlines that never drift.
+
+    A tick that comes a whole period late or more is not made up for: the ticks in between are skipped and counted. In
+    real time a timerfd ticks, because asyncio's own timers are late by up to a millisecond.
+
+    Args:
+        period_s: time between ticks; the first comes one period after :meth:`start`.
+        callback: called at each tick; must not block.
+
+    Attributes:
+        ticks: calls made.
+        missed: ticks skipped.
+        late: calls made more than half a period behind their deadline.
+        max_lateness_s: worst delay of a call behind its deadline.
+    """
+
+    def __init__(self, period_s: float, callback: Callable[[], None]) -> None:
+        self.period_s = period_s
+        self.ticks = 0
+        self.missed = 0
+        self.late = 0
+        self.max_lateness_s = 0.0
+        self._callback = callback
+        self._start_s = 0.0
+        self._due = 0
+        self._timer: asyncio.TimerHandle | None = None
+        self._fd = -1
+
+    @property
+    def running(self) -> bool:
+        """Whether it ticks."""
+        return self._timer is not None or self._fd >= 0
+
+    def start(self) -> None:
+        """Tick from now on, on the running loop; no effect on a ticker that runs."""
+        if self.running:
+            return
+        self._loop = asyncio.get_running_loop()
+        self._start_s = self._loop.time()
+        self._due = 0
+        if isinstance(self._loop, VirtualTimeLoop):
+            self._timer = self._loop.call_at(self._start_s + self.period_s, self._on_timer)
+        else:
+            self._fd = _periodic_timerfd(self._start_s + self.period_s, self.period_s)
+            self._loop.add_reader(self._fd, self._on_timerfd)
+
+    def stop(self) -> None:
+        """Tick no more."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if self._fd >= 0:
+            self._loop.remove_reader(self._fd)
+            os.close(self._fd)
+            self._fd = -1
+
+    def _on_timer(self) -> None:
+        self._due += 1
+        self._timer = self._loop.call_at(self._start_s + (self._due + 1) * self.period_s, self._on_timer)
+        self.ticks += 1
+        self._callback()
+
+    def _on_timerfd(self) -> None:
+        try:
+            expired = int.from_bytes(os.read(self._fd, 8), "little")
+        except BlockingIOError:
+            return
+        self._due += expired
+        self.missed += expired - 1
+        lateness = self._loop.time() - (self._start_s + (self._due - expired + 1) * self.period_s)
+        self.max_lateness_s = max(self.max_lateness_s, lateness)
+        self.late += lateness > 0.5 * self.period_s
+        self.ticks += 1
+        self._callback()
+
+
+_TFD_TIMER_ABSTIME = 1
+
+
+class _Itimerspec(ctypes.Structure):
+    _fields_ = (
+        ("interval_s", ctypes.c_long),
+        ("interval_ns", ctypes.c_long),
+        ("value_s", ctypes.c_long),
+        ("value_ns", ctypes.c_long),
+    )
+
+
+def _periodic_timerfd(first_s: float, period_s: float) -> int:
+    """A non-blocking timerfd on the monotonic clock, which is the one of asyncio's loops (timerfd_create(2))."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    fd = int(libc.timerfd_create(time.CLOCK_MONOTONIC, os.O_NONBLOCK | os.O_CLOEXEC))
+    if fd < 0:
+        raise OSError(ctypes.get_errno(), "timerfd_create failed")
+    spec = _Itimerspec(*divmod(round(period_s * 1e9), 1_000_000_000), *divmod(round(first_s * 1e9), 1_000_000_000))
+    if libc.timerfd_settime(fd, _TFD_TIMER_ABSTIME, ctypes.byref(spec), None) < 0:
+        os.close(fd)
+        raise OSError(ctypes.get_errno(), "timerfd_settime failed")
+    return fd

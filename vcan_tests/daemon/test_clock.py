@@ -1,0 +1,177 @@
+"""Virtual time and the ticker."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+
+import pytest
+
+from daemon.runtime.clock import Deadlock, Ticker, VirtualTimeLoop, run_virtual
+
+
+async def test_tests_run_on_virtual_time() -> None:
+    assert isinstance(asyncio.get_running_loop(), VirtualTimeLoop)
+
+
+@pytest.mark.real_time
+async def test_a_marked_test_runs_in_real_time() -> None:
+    assert not isinstance(asyncio.get_running_loop(), VirtualTimeLoop)
+
+
+async def test_time_jumps_exactly_to_the_next_timer() -> None:
+    seen: list[float] = []
+    loop = asyncio.get_running_loop()
+    loop.call_at(0.1 + 0.2, lambda: seen.append(loop.time()))
+    await asyncio.sleep(1.0)
+    assert seen == [0.1 + 0.2]
+
+
+def test_an_hour_takes_no_time() -> None:
+    began = time.monotonic()
+    run_virtual(asyncio.sleep(3600.0))
+    assert time.monotonic() - began < 1.0
+
+
+async def test_timers_of_one_time_run_in_the_order_they_were_set() -> None:
+    seen: list[int] = []
+    loop = asyncio.get_running_loop()
+    for number in range(50):
+        loop.call_at(1.0, seen.append, number)
+    await asyncio.sleep(2.0)
+    assert seen == list(range(50))
+
+
+async def test_what_is_ready_runs_before_time_goes_on() -> None:
+    seen: list[str] = []
+    loop = asyncio.get_running_loop()
+    loop.call_at(1.0, lambda: loop.call_soon(seen.append, "soon"))
+    loop.call_at(1.0 + 1e-9, seen.append, "later")
+    await asyncio.sleep(2.0)
+    assert seen == ["soon", "later"]
+
+
+async def test_a_timer_in_the_past_does_not_turn_time_back() -> None:
+    loop = asyncio.get_running_loop()
+    await asyncio.sleep(1.0)
+    called = loop.create_future()
+    loop.call_at(0.5, called.set_result, None)
+    await called
+    assert loop.time() == 1.0
+
+
+async def test_a_cancelled_timer_does_not_move_time() -> None:
+    loop = asyncio.get_running_loop()
+    loop.call_at(5.0, print).cancel()
+    await asyncio.sleep(1.0)
+    assert loop.time() == 1.0
+
+
+async def test_a_timer_cancelled_at_its_own_time_does_not_run() -> None:
+    seen: list[int] = []
+    loop = asyncio.get_running_loop()
+    timers: list[asyncio.TimerHandle] = []
+    loop.call_at(1.0, lambda: timers[0].cancel())
+    timers.append(loop.call_at(1.0, seen.append, 2))
+    await asyncio.sleep(2.0)
+    assert seen == []
+
+
+async def wait_forever() -> None:
+    await asyncio.get_running_loop().create_future()
+
+
+def test_waiting_for_what_cannot_happen_is_an_error() -> None:
+    with pytest.raises(Deadlock, match="cannot happen"):
+        run_virtual(wait_forever())
+
+
+def test_left_tasks_are_cancelled_at_the_end() -> None:
+    left: list[asyncio.Task[None]] = []
+
+    async def leave_one() -> str:
+        left.append(asyncio.create_task(wait_forever()))
+        await asyncio.sleep(0.1)
+        return "done"
+
+    assert run_virtual(leave_one()) == "done"
+    assert left[0].cancelled()
+
+
+async def test_a_time_out_runs_on_virtual_time() -> None:
+    with pytest.raises(TimeoutError):
+        await asyncio.wait_for(wait_forever(), 10.0)
+    assert asyncio.get_running_loop().time() == 10.0
+
+
+async def test_threads_are_refused() -> None:
+    with pytest.raises(NotImplementedError, match="virtual time"):
+        await asyncio.to_thread(print)
+
+
+async def test_a_ticker_does_not_drift() -> None:
+    loop = asyncio.get_running_loop()
+    times: list[float] = []
+    ticker = Ticker(0.01, lambda: times.append(loop.time()))
+    ticker.start()
+    await asyncio.sleep(100.005)
+    assert times == pytest.approx([0.01 * (n + 1) for n in range(10_000)], abs=1e-9)
+
+
+async def test_a_stopped_ticker_is_silent_and_may_be_started_again() -> None:
+    ticker = Ticker(0.1, lambda: None)
+    ticker.start()
+    ticker.start()
+    await asyncio.sleep(0.35)
+    ticker.stop()
+    await asyncio.sleep(1.0)
+    assert (ticker.ticks, ticker.running) == (3, False)
+    ticker.start()
+    await asyncio.sleep(0.25)
+    assert ticker.ticks == 5
+
+
+async def test_a_callback_may_stop_its_own_ticker() -> None:
+    ticker = Ticker(0.1, lambda: ticker.stop())
+    ticker.start()
+    await asyncio.sleep(1.0)
+    assert ticker.ticks == 1
+
+
+@pytest.mark.real_time
+async def test_a_real_ticker_ticks_at_its_deadlines() -> None:
+    loop = asyncio.get_running_loop()
+    done = loop.create_future()
+    began = loop.time()
+
+    def tick() -> None:
+        if ticker.ticks + ticker.missed >= 10:
+            ticker.stop()
+            done.set_result(loop.time() - began)
+
+    ticker = Ticker(0.005, tick)
+    ticker.start()
+    assert await done >= 0.05
+    assert not ticker.running
+
+
+@pytest.mark.real_time
+async def test_missed_ticks_are_counted_and_not_made_up_for() -> None:
+    loop = asyncio.get_running_loop()
+    done = loop.create_future()
+
+    def block() -> None:
+        if ticker.ticks == 1:
+            while loop.time() < began + 0.035:
+                pass
+        else:
+            ticker.stop()
+            done.set_result(None)
+
+    ticker = Ticker(0.01, block)
+    began = loop.time()
+    ticker.start()
+    await done
+    assert ticker.ticks == 2
+    assert ticker.missed >= 1
+    assert ticker.max_lateness_s >= 0.01
