@@ -1,0 +1,211 @@
+"""What goes over the socket, and where the socket is: JSON-RPC 2.0, one object a line, on a Unix socket.
+
+Pure functions for both ends. ``parse_message`` never raises on what a stranger sent; it returns the reason instead.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import socket
+from pathlib import Path
+from typing import Any
+
+from canhelm.errors import DaemonNotRunning, PermissionRefused, UsageError, from_rpc
+
+API_VERSION = 1
+MAX_REQUEST_BYTES = 65_536
+"""Longest line that the daemon reads."""
+MAX_ANSWER_BYTES = 4 * 1024 * 1024
+"""Longest line that a client reads."""
+RENEW_PERIOD_S = 0.5
+"""A client that waits for a motion renews its lease this often."""
+SILENT_RENEWALS = 10
+"""Renewals without a sign of life after which a client takes its daemon for hung."""
+
+PARSE_ERROR = -32700
+INVALID_REQUEST = -32600
+METHOD_NOT_FOUND = -32601
+INTERNAL_ERROR = -32603
+
+SYSTEM_FOLDER = Path("/run/canhelm")
+_ROBOT_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,63}")
+
+
+# -- messages ---------------------------------------------------------------------------------------------------------
+
+
+def make_message(message: dict[str, Any]) -> bytes:
+    """One message as a line. JSON has no word for NaN and infinity: such numbers are sent as null."""
+    try:
+        text = json.dumps(message, separators=(",", ":"), allow_nan=False)
+    except ValueError:
+        text = json.dumps(_finite(message), separators=(",", ":"), allow_nan=False)
+    return text.encode() + b"\n"
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def make_request(request_id: int, method: str, params: dict[str, Any]) -> bytes:
+    """A request as a line."""
+    return make_message({"jsonrpc": "2.0", "id": request_id, "method": method, "params": params})
+
+
+def make_result(request_id: int | str | None, result: dict[str, Any]) -> bytes:
+    """The answer to a request that was carried out."""
+    return make_message({"jsonrpc": "2.0", "id": request_id, "result": result})
+
+
+def make_error(request_id: int | str | None, code: int, message: str, data: dict[str, Any]) -> bytes:
+    """The answer to a request that was not carried out; ``data`` carries type, node, object, limit and remedy."""
+    error = {"code": code, "message": message, "data": data}
+    return make_message({"jsonrpc": "2.0", "id": request_id, "error": error})
+
+
+def make_notification(method: str, params: dict[str, Any]) -> bytes:
+    """A message that nobody answers."""
+    return make_message({"jsonrpc": "2.0", "method": method, "params": params})
+
+
+def parse_message(line: bytes) -> dict[str, Any] | str:
+    """The message in a line, or the reason why there is none."""
+    try:
+        message = json.loads(line.decode(), parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as error:
+        return f"not JSON: {type(error).__name__}"
+    return message if isinstance(message, dict) else "not a JSON object"
+
+
+def _refuse_constant(name: str) -> None:
+    raise ValueError(f"{name} is not JSON")
+
+
+def result_of(answer: dict[str, Any]) -> dict[str, Any]:
+    """The result in an answer.
+
+    Raises:
+        CanhelmError: the leaf that the daemon named, if the answer is an error.
+    """
+    error = answer.get("error")
+    if isinstance(error, dict):
+        raise from_rpc(error)
+    result = answer.get("result")
+    return result if isinstance(result, dict) else {}
+
+
+# -- sockets ----------------------------------------------------------------------------------------------------------
+
+
+def user_folder() -> Path:
+    """Where this user's daemons open their sockets when no service manager gives them a folder."""
+    runtime = os.environ.get("XDG_RUNTIME_DIR")
+    return Path(runtime) / "canhelm" if runtime else Path(f"/tmp/canhelm-{os.getuid()}")
+
+
+def default_socket(robot: str) -> Path:
+    """Where the daemon of a robot listens unless it is told otherwise.
+
+    Raises:
+        UsageError: the name cannot be the name of a file.
+    """
+    given = os.environ.get("RUNTIME_DIRECTORY")
+    folder = Path(given.split(":")[0]) if given else user_folder()
+    return folder / f"{_checked_name(robot)}.sock"
+
+
+def _checked_name(robot: str) -> str:
+    if not _ROBOT_NAME.fullmatch(robot):
+        raise UsageError(f"{robot!r} is not a robot's name", value=robot, remedy="use letters, digits, _ . and -")
+    return robot
+
+
+def choose_socket(socket_path: str | os.PathLike[str] | None = None, robot: str | None = None) -> Path:
+    """The socket to talk to: the one named, the one of a robot, or the only one on which a daemon answers.
+
+    Raises:
+        DaemonNotRunning: no socket is named and none answers.
+        PermissionRefused: the system's folder of sockets is closed to this user and there is no other.
+        UsageError: several daemons run and none is chosen.
+    """
+    if socket_path:
+        return Path(socket_path)
+    if robot:
+        name = f"{_checked_name(robot)}.sock"
+        found = [folder / name for folder in (SYSTEM_FOLDER, user_folder())]
+        return next((path for path in found if os.path.exists(path)), found[-1])
+    return _only_one(find_sockets())
+
+
+def find_sockets() -> list[Path]:
+    """The sockets on which a daemon answers (or would, if this user were allowed to ask), sorted."""
+    paths = [path for folder in (SYSTEM_FOLDER, user_folder()) for path in _sockets_in(folder)]
+    return [path for path in paths if is_live(path)]
+
+
+def _sockets_in(folder: Path) -> list[Path]:
+    try:
+        return sorted(path for path in folder.iterdir() if path.suffix == ".sock")
+    except OSError:
+        return []
+
+
+def _only_one(live: list[Path]) -> Path:
+    if len(live) > 1:
+        names = ", ".join(path.stem for path in live)
+        raise UsageError(f"several daemons run: {names}", remedy="choose one with --robot NAME or --socket PATH")
+    if live:
+        return live[0]
+    if SYSTEM_FOLDER.is_dir() and not os.access(SYSTEM_FOLDER, os.R_OK | os.X_OK):
+        raise _refused(SYSTEM_FOLDER)
+    raise DaemonNotRunning(
+        "no daemon is running", remedy="start one: canhelm run --simulate --profile max2d, or systemctl start canhelm"
+    )
+
+
+def is_live(path: str | os.PathLike[str]) -> bool:
+    """Whether somebody listens on a socket."""
+    try:
+        open_socket(path).close()
+    except DaemonNotRunning:
+        return False
+    except PermissionRefused:
+        return True
+    return True
+
+
+def open_socket(path: str | os.PathLike[str], timeout_s: float = 5.0) -> socket.socket:
+    """A connected socket.
+
+    Raises:
+        DaemonNotRunning: nobody listens there.
+        PermissionRefused: somebody may, but this user may not open it.
+    """
+    connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    connection.settimeout(timeout_s)
+    try:
+        connection.connect(os.fspath(path))
+    except PermissionError:
+        connection.close()
+        raise _refused(path) from None
+    except OSError as error:
+        connection.close()
+        raise DaemonNotRunning(
+            f"no daemon answers on {os.fspath(path)}: {error.strerror or error}",
+            remedy="start it: canhelm run --profile NAME (add --simulate without hardware), or systemctl start canhelm",
+        ) from None
+    return connection
+
+
+def _refused(path: str | os.PathLike[str]) -> PermissionRefused:
+    return PermissionRefused(
+        f"this user may not open {os.fspath(path)}",
+        remedy="join the group: sudo usermod -aG canhelm $USER, then log in again",
+    )

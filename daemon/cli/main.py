@@ -1,0 +1,122 @@
+"""The command ``canhelm``: which commands there are, and what their failures become (exit codes).
+
+Every command is loaded when it is called, so that one does not pay for the others.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from cyclopts import App, CycloptsError, Group
+from cyclopts.config import Env
+
+from canhelm import __version__
+from canhelm.errors import CanhelmError
+from daemon.cli.output import say, say_error
+
+if TYPE_CHECKING:
+    from cyclopts import ArgumentCollection
+
+INTERRUPTED = 130
+
+DRIVING = Group("Every day", sort_key=1)
+LOOKING = Group("Looking", sort_key=2)
+NETWORK = Group("Network and devices", sort_key=3)
+SETUP = Group("Daemon and setup", sort_key=4)
+EXPERIMENTS = Group("Simulation and experiments", sort_key=5)
+
+COMMANDS: dict[Group, dict[str, tuple[str, str]]] = {
+    DRIVING: {
+        "stop": ("daemon.cli.stop:stop", "Stop everything now."),
+        "status": ("daemon.cli.status:status", "State at a glance."),
+        "steer": ("daemon.cli.steer:steer", "Turn a pair of wheels to a heading."),
+        "drive": ("daemon.cli.drive:app", "Drive the vehicle."),
+        "motor": ("daemon.cli.motor:app", "Enable, turn and stop one motor."),
+        "brake": ("daemon.cli.brake:app", "Engage, release and look at brakes."),
+        "estop": ("daemon.cli.stop:estop", "Emergency stop: quick stop, disable, latched until reset."),
+        "reset": ("daemon.cli.stop:reset", "Clear an emergency stop and faults."),
+    },
+    LOOKING: {
+        "monitor": ("daemon.cli.monitor:monitor", "Live screen."),
+        "doctor": ("daemon.cli.doctor:doctor", "What is wrong, each with the line that mends it."),
+        "explain": ("daemon.cli.explain:explain", "A code, an object or a frame in words, with cause and cure."),
+    },
+    NETWORK: {
+        "nmt": ("daemon.cli.nmt:app", "Network management commands to a node."),
+        "sdo": ("daemon.cli.sdo:app", "Read and write objects of a node."),
+        "object": ("daemon.cli.object:app", "The object dictionary."),
+    },
+    SETUP: {
+        "run": ("daemon.cli.run:run", "The daemon in the foreground."),
+        "profile": ("daemon.cli.profile:app", "Profiles of robots."),
+        "version": ("daemon.cli.version:version", "Versions of canhelm and of what it stands on."),
+        "completion": ("daemon.cli.completion:completion", "Completion for bash, zsh and fish."),
+    },
+    EXPERIMENTS: {
+        "demo": ("daemon.cli.demo:demo", "Simulated network, daemon and the published manoeuvres in one process."),
+        "sim": ("daemon.cli.sim:app", "Do things to the simulated network."),
+    },
+}
+
+
+class OptionEnv(Env):
+    """``CANHELM_OPTION`` for every option; arguments come from the command line alone."""
+
+    def __call__(self, app: App, commands: tuple[str, ...], arguments: ArgumentCollection) -> None:
+        """Fill options that the command line did not give."""
+        options = [argument for argument in arguments if argument.name.startswith("--")]
+        super().__call__(app, commands, type(arguments)(options))
+
+
+def build_app() -> App:
+    """The command line with all its commands, none of them loaded."""
+    app = App(
+        name="canhelm",
+        help="Drive robots with maxon EPOS controllers over CAN, and simulate them.",
+        help_epilogue="Example: `canhelm drive turn --rear 10 --front -10 --speed 0.3 --duration 5`\n\n"
+        "Every option can come from the environment: CANHELM_SOCKET, CANHELM_ROBOT, CANHELM_JSON ...",
+        help_format="markdown",
+        version=__version__,
+        config=OptionEnv("CANHELM_", command=False, show=False),
+        suppress_keyboard_interrupt=False,
+    )
+    for group, commands in COMMANDS.items():
+        for rank, (name, (path, text)) in enumerate(commands.items()):
+            app.command(path, name=name, help=text, group=group, sort_key=rank)
+    return app
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Args:
+        argv: the arguments; None: those of the process.
+
+    Returns:
+        The exit code: 0 done, 1 refused or failed, 2 wrong usage, 3 no daemon, 4 no node, 5 timed out, 6 interlock or
+        emergency stop, 7 configuration invalid, 130 interrupted.
+    """
+    try:
+        code = _run(sys.argv[1:] if argv is None else argv)
+        sys.stdout.flush()
+    except CycloptsError as error:
+        say(f"{error} - see: canhelm {' '.join(error.command_chain or ())} --help".replace("  ", " "))
+        return 2
+    except CanhelmError as error:
+        say_error(error)
+        return error.exit_code
+    except KeyboardInterrupt:
+        say("interrupted")
+        return INTERRUPTED
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    return code
+
+
+def _run(argv: Sequence[str]) -> int:
+    result = build_app()(list(argv), exit_on_error=False, print_error=False, result_action="return_value")
+    return result if isinstance(result, int) else 0

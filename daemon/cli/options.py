@@ -1,0 +1,55 @@
+"""What the commands on a running daemon share: which daemon, JSON or not, and how a node is named."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from canhelm.client import Client
+from canhelm.errors import UsageError
+from daemon.cli.output import Json
+
+Node = Annotated[str, Parameter(help="Node id (1 to 127) or a name from the profile (front_left).")]
+Pair = Annotated[str, Parameter(help="front, rear or all.")]
+NoWait = Annotated[bool, Parameter(name="--no-wait", negative=(), help="Hand the motion to the daemon; print its id.")]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True)
+class Options:
+    """Which daemon to ask, and how to print its answer."""
+
+    socket: str | None = None
+    """Socket of the daemon."""
+    robot: str | None = None
+    """Name of the robot, where several daemons run."""
+    json: Json = None
+
+    def client(self) -> Client:
+        """A connection to the chosen daemon."""
+        return Client(self.socket, self.robot)
+
+
+DEFAULT = Options()
+
+
+def node_of(text: str) -> int | str:
+    """A node as the daemon takes it: id or name.
+
+    Raises:
+        UsageError: a number outside 1..127, or no name at all.
+    """
+    if re.fullmatch(r"[A-Za-z_][\w.-]*", text):
+        return text
+    try:
+        node = int(text, 0)
+    except ValueError:
+        raise UsageError(
+            f"{text!r} is no node", value=text, remedy="give a node id or a name from the profile"
+        ) from None
+    if not 1 <= node <= 127:
+        raise UsageError(f"node id {node} is out of range", value=node, limit="1 to 127", remedy="give 1 to 127")
+    return node

@@ -1,0 +1,95 @@
+"""How commands speak: data on stdout (a table for a terminal, else one JSON object a line), all else on stderr.
+
+rich is loaded only when something is drawn.
+"""
+
+from __future__ import annotations
+
+import json as json_text
+import math
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+if TYPE_CHECKING:
+    from rich.console import Console, RenderableType
+
+    from canhelm.errors import CanhelmError
+
+Json = Annotated[
+    bool | None,
+    Parameter(name="--json", negative=(), help="One JSON object a line (the default when the output is no terminal)."),
+]
+"""Type of every command's ``json`` parameter: ``json: Json = None``."""
+
+
+def wants_json(flag: bool | None) -> bool:
+    """Whether to write JSON: as told, else when stdout is no terminal."""
+    return flag if flag is not None else not sys.stdout.isatty()
+
+
+def show(
+    data: Mapping[str, Any] | Iterable[Mapping[str, Any]],
+    table: Callable[[Any], RenderableType] | None = None,
+    json: bool | None = None,
+) -> None:
+    """Write data to stdout.
+
+    Args:
+        data: one object, or several (one line each).
+        table: makes a rich renderable or a string of the data for a terminal; None: a line a field.
+        json: True for JSON, False for the table, None: JSON unless stdout is a terminal.
+    """
+    if wants_json(json):
+        for item in [data] if isinstance(data, Mapping) else data:
+            print(json_text.dumps(plain(item), ensure_ascii=False), flush=True)
+    elif table is not None:
+        console().print(table(data))
+    else:
+        for item in [data] if isinstance(data, Mapping) else data:
+            print("\n".join(f"{key}: {words(value)}" for key, value in item.items()))
+
+
+def plain(value: Any) -> Any:
+    """The value as JSON can carry it: NaN and infinity become null, what JSON does not know becomes its text."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value if value is None or isinstance(value, str | int | float) else str(value)
+
+
+def words(value: Any, digits: int = 4) -> str:
+    """A value for people: short numbers, yes and no, a dash for nothing."""
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.{digits}g}"
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} {words(item, digits)}" for key, item in value.items())
+    if isinstance(value, list | tuple):
+        return ", ".join(words(item, digits) for item in value)
+    return str(value)
+
+
+def console(stderr: bool = False) -> Console:
+    """A rich console on stdout or stderr; it honours NO_COLOR and draws nothing moving off a terminal."""
+    from rich.console import Console
+
+    return Console(stderr=stderr, highlight=False)
+
+
+def say(text: str) -> None:
+    """A sentence for people, on stderr."""
+    print(f"canhelm: {text}", file=sys.stderr, flush=True)
+
+
+def say_error(error: CanhelmError) -> None:
+    """What went wrong and what to do next, on stderr."""
+    say(f"{error.message} - {error.remedy}" if error.remedy else error.message)
