@@ -1,83 +1,99 @@
 """What a robot's profile says: types, units and defaults. Every number of a robot that code needs stands here.
 
-A profile is YAML; ``profiles.loader`` reads it, merges ``extends:``, checks it and builds these objects. Values that the
-sources do not give carry the tag ``!assumed`` in YAML; the loader lists them in :attr:`Profile.assumed`.
+A profile is YAML; ``profiles.loader`` reads it, merges ``extends:``, checks it and builds these objects. Values
+that the sources do not give carry the tag ``!assumed``; the loader lists them in ``LoadedProfile.assumed``.
+
+The docstring under a field is its description in the JSON Schema, too.
 
 Frames and signs: x forward, y left, angles counter-clockwise positive, a wheel's speed positive when it rolls forward.
 """
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import msgspec
+from msgspec import Meta
 
 SCHEMA_VERSION = 1
 
+NodeId = Annotated[int, Meta(ge=1, le=127)]
+Name = Annotated[str, Meta(pattern="^[A-Za-z][A-Za-z0-9_-]*$", max_length=40)]
+"""Begins with a letter: commands take a node id or a name."""
+Positive = Annotated[float, Meta(gt=0)]
+NotNegative = Annotated[float, Meta(ge=0)]
+Efficiency = Annotated[float, Meta(gt=0, le=1)]
+Counts = Annotated[int, Meta(ge=0, le=2**32 - 1)]
 
-class Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+
+class Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Common base: unknown keys are errors, values do not change."""
 
 
-class Network(Part):
+class Network(Part, frozen=True, kw_only=True):
     """The CAN network and its timing."""
 
-    bit_rate: int = 1_000_000
-    """bit/s"""
-    cycle_hz: float = 100.0
+    bit_rate: Literal[1_000_000, 800_000, 500_000, 250_000, 125_000, 50_000, 20_000] = 1_000_000
+    """bit/s; the rates that object 0x2001 of the drive knows."""
+    cycle_hz: Annotated[float, Meta(ge=1, le=1000)] = 100.0
     """Control cycles (and SYNCs) per second."""
-    guard_time_ms: int = 100
+    guard_time_ms: Annotated[int, Meta(ge=1, le=65535)] = 100
     """Time between two guard requests to a node (object 0x100C)."""
-    life_time_factor: int = 3
+    life_time_factor: Annotated[int, Meta(ge=1, le=255)] = 3
     """Guard times without a request after which a node declares its master lost (object 0x100D)."""
-    boot_deadline_s: float = 3.0
+    boot_deadline_s: Positive = 3.0
     """Time one attempt to configure a node may take before it is started over."""
-    sdo_timeout_s: float = 0.25
+    sdo_timeout_s: Positive = 0.25
+    """Time a node has to answer one SDO request."""
 
 
-class Motor(Part):
+class Motor(Part, frozen=True, kw_only=True):
     """A motor's data. What the drive is set to and what the simulation computes with."""
 
     type: Literal["brushed_dc", "brushless_sine", "brushless_block"] = "brushless_block"
-    nominal_voltage_v: float
-    nominal_speed_rpm: float
-    nominal_torque_n_m: float
-    nominal_current_a: float
-    torque_constant_n_m_a: float
-    resistance_ohm: float
-    rotor_inertia_kg_m2: float
-    no_load_current_a: float = 0.0
-    pole_pairs: int = 1
-    thermal_time_constant_s: float = 4.0
+    nominal_voltage_v: Positive
+    nominal_speed_rpm: Positive
+    nominal_torque_n_m: Positive
+    nominal_current_a: Positive
+    torque_constant_n_m_a: Positive
+    resistance_ohm: Positive
+    rotor_inertia_kg_m2: Positive
+    no_load_current_a: NotNegative = 0.0
+    pole_pairs: Annotated[int, Meta(ge=1, le=255)] = 1
+    thermal_time_constant_s: Annotated[float, Meta(ge=0.1, le=1310.7)] = 4.0
+    """Of the winding (object 0x6410/5)."""
 
 
-class DriveConfig(Part):
+class DriveConfig(Part, frozen=True, kw_only=True):
     """One drive with its motor, gear, encoder and wheel."""
 
-    node: int
+    node: NodeId
     device: Literal["epos24_5"] = "epos24_5"
     motor: Motor
-    encoder_pulses_per_turn: int
+    encoder_pulses_per_turn: Annotated[int, Meta(ge=16, le=7500)]
     """Pulses; quad counts (qc) are four times as many."""
-    gear_ratio: float
+    gear_ratio: Positive
     """Motor turns per turn of the gear's output."""
-    gear_efficiency: float = 1.0
-    belt_ratio: float = 1.0
+    gear_efficiency: Efficiency = 1.0
+    belt_ratio: Positive = 1.0
     """Turns of the gear's output per turn of the wheel."""
-    wheel_radius_m: float
+    wheel_radius_m: Positive
     direction: Literal[1, -1] = 1
     """1: positive motor speed rolls the wheel forward; -1: the motor is mounted mirrored."""
     mode: Literal["profile_velocity", "velocity"] = "profile_velocity"
     """Mode of operation for driving: 3 (object 0x60FF) or -2 (object 0x206B)."""
-    max_speed_m_s: float
+    max_speed_m_s: Positive
     """Limit of the wheel's speed, enforced before encoding and written to the drive where it has an object for it."""
-    acceleration_m_s2: float
+    acceleration_m_s2: Positive
     """Ramp of the drive for a new target velocity, at the wheel's rim (objects 0x6083, 0x6084)."""
-    quick_stop_m_s2: float
+    quick_stop_m_s2: Positive
     """Ramp of the drive for quick stop and for faults of class Q (object 0x6085)."""
-    continuous_current_a: float
-    output_current_a: float
-    max_following_error_qc: int = 2000
+    continuous_current_a: Annotated[float, Meta(gt=0, le=5)]
+    """Current the motor may carry for ever (object 0x6410/1)."""
+    output_current_a: Annotated[float, Meta(gt=0, le=10)]
+    """Highest current for a short time (object 0x6410/2)."""
+    max_following_error_qc: Counts = 2000
+    """Difference between demanded and actual position at which the drive faults (object 0x6065)."""
 
     @property
     def qc_per_motor_turn(self) -> int:
@@ -90,21 +106,21 @@ class DriveConfig(Part):
         return self.gear_ratio * self.belt_ratio
 
 
-class EncoderConfig(Part):
+class EncoderConfig(Part, frozen=True, kw_only=True):
     """One steering encoder (CiA 406) on the vertical axis of a wheel pair."""
 
-    node: int
+    node: NodeId
     device: Literal["cia406"] = "cia406"
-    counts_per_turn: int
-    total_counts: int | None = None
+    counts_per_turn: Annotated[int, Meta(ge=1, le=2**32 - 1)]
+    total_counts: Annotated[int, Meta(ge=1, le=2**32 - 1)] | None = None
     """Measuring range (object 0x6002); None: the same as counts_per_turn (single-turn)."""
     direction: Literal[1, -1] = 1
     """1: counts grow when the pair turns counter-clockwise."""
-    zero_counts: int = 0
+    zero_counts: Counts = 0
     """Position value at heading 0."""
 
 
-class BrakeConfig(Part):
+class BrakeConfig(Part, frozen=True, kw_only=True):
     """One brake, switched by a digital output of a drive."""
 
     kind: Literal["steering", "holding"]
@@ -116,24 +132,25 @@ class BrakeConfig(Part):
     output_bit: Literal[12, 13, 14, 15] = 12
     """Bit of objects 0x2078 and 0x2079 that stands for it."""
     energise_to_release: bool = True
-    open_time_s: float
-    close_time_s: float
+    """False: current engages the brake and a loss of power releases it."""
+    open_time_s: NotNegative
+    close_time_s: NotNegative
 
 
-class PairedSteerGeometry(Part):
+class PairedSteerGeometry(Part, frozen=True, kw_only=True):
     """Geometry and body of a four-wheel robot whose wheels steer in pairs (MAX2D thesis, chapter 4)."""
 
     type: Literal["paired_steer"] = "paired_steer"
-    mass_kg: float
-    wheelbase_m: float
+    mass_kg: Positive
+    wheelbase_m: Positive
     """l: distance between the steering axes of the rear and the front pair."""
-    pivot_track_m: float
+    pivot_track_m: Positive
     """h: distance between the steering axes of the right and the left side."""
-    contact_offset_m: float
+    contact_offset_m: NotNegative
     """a: from a steering axis outward along the axle to the wheel's contact point."""
     contact_lead_m: float
     """b: from a steering axis outward along the heading (front pair forward, rear pair backward)."""
-    max_heading_deg: float
+    max_heading_deg: Annotated[float, Meta(gt=0, lt=90)]
     """Steering stops: a pair turns at most this far to each side."""
     wheels: tuple[str, str, str, str]
     """Names of the drives of wheels 1 to 4: rear right, rear left, front left, front right."""
@@ -141,63 +158,64 @@ class PairedSteerGeometry(Part):
     """Names of the steering encoders: rear, front."""
     brakes: tuple[str, str]
     """Names of the steering brakes: rear, front."""
-    yaw_inertia_kg_m2: float
-    centre_of_mass_height_m: float = 0.0
+    yaw_inertia_kg_m2: Positive
+    centre_of_mass_height_m: NotNegative = 0.0
 
 
-class Limits(Part):
+class Limits(Part, frozen=True, kw_only=True):
     """What the vehicle may do; the gate before encoding enforces it."""
 
-    speed_m_s: float
+    speed_m_s: Positive
     """Of the vehicle's centre."""
-    acceleration_m_s2: float
-    wheel_speed_m_s: float
-    steering_rim_speed_m_s: float
+    acceleration_m_s2: Positive
+    wheel_speed_m_s: Positive
+    steering_rim_speed_m_s: Positive
     """Rim speed of the wheels while a pair turns."""
-    heading_deg: float
+    heading_deg: Positive
     """Steering heading that commands may ask for (within the stops)."""
-    heading_tolerance_deg: float = 0.2
+    heading_tolerance_deg: Positive = 0.2
     """A pair counts as steered when it is closer to its target than this."""
 
 
-class Tyre(Part):
+class Tyre(Part, frozen=True, kw_only=True):
     """Tyre data of the simulation."""
 
-    friction: float
+    friction: Positive
     """Coefficient of friction between tyre and floor."""
-    slip_stiffness: float
+    slip_stiffness: Positive
     """Longitudinal force per unit of slip ratio, in multiples of the wheel's load."""
-    cornering_stiffness_per_rad: float
+    cornering_stiffness_per_rad: Positive
     """Lateral force per radian of slip angle, in multiples of the wheel's load."""
-    relaxation_length_m: float
-    rolling_resistance: float = 0.0
+    relaxation_length_m: Positive
+    rolling_resistance: Annotated[float, Meta(ge=0, lt=1)] = 0.0
     """Coefficient of rolling resistance."""
 
 
-class SimulationConfig(Part):
+class SimulationConfig(Part, frozen=True, kw_only=True):
     """What only the simulated network needs to know."""
 
     tyre: Tyre
-    supply_voltage_v: float = 24.0
-    wheel_inertia_kg_m2: float
-    steering_inertia_kg_m2: float
+    supply_voltage_v: Annotated[float, Meta(ge=11, le=24)] = 24.0
+    wheel_inertia_kg_m2: Positive
+    steering_inertia_kg_m2: Positive
     """Of one wheel pair about its steering axes, wheels and coupling belt together."""
-    steering_friction_n_m: float
+    steering_friction_n_m: NotNegative
     """Dry friction of one pair's steering axes and coupling belt."""
-    brake_holding_torque_n_m: float
+    brake_holding_torque_n_m: Positive
     """Torque at which an engaged steering brake slips."""
 
 
-class Profile(Part):
+class Profile(Part, frozen=True, kw_only=True):
     """A robot: network, drives, encoders, brakes, vehicle, limits, simulation."""
 
     schema_version: int
-    name: str
+    name: Name
+    """Name of the robot; its socket is called after it."""
     description: str = ""
     network: Network = Network()
-    drives: dict[str, DriveConfig]
-    encoders: dict[str, EncoderConfig] = {}
-    brakes: dict[str, BrakeConfig] = {}
+    drives: Annotated[dict[Name, DriveConfig], Meta(min_length=1)]
+    encoders: dict[Name, EncoderConfig] = {}
+    brakes: dict[Name, BrakeConfig] = {}
     vehicle: PairedSteerGeometry | None = None
     limits: Limits
     simulation: SimulationConfig | None = None
