@@ -1,0 +1,151 @@
+"""Whether the parts of a profile fit together: version, node ids, references, wiring of the brakes.
+
+These checks work on plain data, so that they also find what is wrong with the rest of a profile whose types are wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from profiles.provenance import Mistake, Node, Path_, dotted, place_of
+from profiles.schema import SCHEMA_VERSION
+
+WHEEL_ROLES = ("rear right", "rear left", "front left", "front right")
+REFERENCES = {"wheels": "drives", "encoders": "encoders", "brakes": "brakes"}
+"""Lists of names in ``vehicle`` and the part that defines the names."""
+STRONG_OUTPUT = 4
+"""DigOUT4 carries 1 A, the others 100 mA (maxon EPOS 24/5 Hardware Reference 6.3)."""
+FIRST_OUTPUT_BIT = 15
+"""DigOUT1 is general purpose A, bit 15; each next output is one bit lower (Firmware Specification 14.1.41)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A mistake, or a warning, at a path of the profile.
+
+    Attributes:
+        path: keys and indices from the root.
+        what: what is wrong.
+        remedy: what to do.
+        warning: True when the profile may be used all the same.
+        other: path of a second place that belongs to it; its file:line is put where ``what`` says ``{other}``.
+    """
+
+    path: Path_
+    what: str
+    remedy: str
+    warning: bool = False
+    other: Path_ | None = None
+
+    def located(self, tree: Node) -> Mistake:
+        """The mistake with its file and line."""
+        what = self.what
+        if self.other is not None:
+            what = what.replace("{other}", f"{dotted(self.other)} ({place_of(tree, self.other)})")
+        return Mistake(place_of(tree, self.path), dotted(self.path), what, self.remedy)
+
+
+def findings(data: dict[str, Any]) -> Iterator[Finding]:
+    """Everything that does not fit together in a profile's plain data."""
+    yield from _version(data)
+    yield from _node_ids(data)
+    yield from _vehicle_names(data)
+    yield from _brakes(data)
+    yield from _encoders(data)
+    yield from _unused(data)
+
+
+def part(data: Any, key: str) -> dict[str, Any]:
+    """The mapping under ``key``; empty when there is none."""
+    value = data.get(key) if isinstance(data, dict) else None
+    return value if isinstance(value, dict) else {}
+
+
+def _version(data: dict[str, Any]) -> Iterator[Finding]:
+    version = data.get("schema_version")
+    if isinstance(version, int) and version != SCHEMA_VERSION:
+        remedy = "install a newer canhelm" if version > SCHEMA_VERSION else f"write schema_version: {SCHEMA_VERSION}"
+        yield Finding(("schema_version",), f"is {version}, this canhelm reads {SCHEMA_VERSION}", remedy)
+
+
+def _node_ids(data: dict[str, Any]) -> Iterator[Finding]:
+    first: dict[int, Path_] = {}
+    for kind in ("drives", "encoders"):
+        for name in part(data, kind):
+            node, path = part(part(data, kind), name).get("node"), (kind, name, "node")
+            if not isinstance(node, int) or first.setdefault(node, path) == path:
+                continue
+            yield Finding(path, f"node id {node} is taken by {{other}}", "give each its own", other=first[node])
+
+
+def _vehicle_names(data: dict[str, Any]) -> Iterator[Finding]:
+    for key, kind in REFERENCES.items():
+        names = part(data, "vehicle").get(key)
+        names = names if isinstance(names, list) else []
+        for index, name in enumerate(names):
+            path = ("vehicle", key, index)
+            if name not in part(data, kind):
+                yield _unknown(path, kind, name, part(data, kind))
+            elif name in names[:index]:
+                yield Finding(path, f"{name!r} stands here twice", f"name each of {kind} once")
+
+
+def _unknown(path: Path_, kind: str, name: Any, known: dict[str, Any]) -> Finding:
+    return Finding(path, f"{kind} has no {name!r}", f"use one of: {', '.join(known) or f'({kind} is empty)'}")
+
+
+def _brakes(data: dict[str, Any]) -> Iterator[Finding]:
+    brakes, drives = part(data, "brakes"), part(data, "drives")
+    wired: dict[tuple[str, int], str] = {}
+    for name in brakes:
+        brake = part(brakes, name)
+        drive, output, bit = brake.get("drive"), brake.get("output", STRONG_OUTPUT), brake.get("output_bit", 12)
+        if not (isinstance(drive, str) and isinstance(output, int) and isinstance(bit, int)):
+            continue
+        if drive not in drives:
+            yield _unknown(("brakes", name, "drive"), "drives", drive, drives)
+        other = wired.setdefault((drive, output), name)
+        if other != name:
+            what = f"output {output} of {drive} already switches {{other}}"
+            yield Finding(("brakes", name), what, "give each brake its own output", other=("brakes", other))
+        yield from _wiring(name, output, bit)
+
+
+def _wiring(name: str, output: int, bit: int) -> Iterator[Finding]:
+    fitting = FIRST_OUTPUT_BIT + 1 - output
+    if bit != fitting:
+        what = f"bit {bit} does not drive output {output}"
+        yield Finding(("brakes", name, "output_bit"), what, f"write output_bit: {fitting}")
+    if output != STRONG_OUTPUT:
+        what = f"output {output} carries 100 mA only"
+        remedy = f"use output {STRONG_OUTPUT} (1 A), or a relay"
+        yield Finding(("brakes", name, "output"), what, remedy, warning=True)
+
+
+def _encoders(data: dict[str, Any]) -> Iterator[Finding]:
+    for name in part(data, "encoders"):
+        encoder = part(part(data, "encoders"), name)
+        per_turn = encoder.get("counts_per_turn")
+        total, zero = encoder.get("total_counts") or per_turn, encoder.get("zero_counts", 0)
+        if not (isinstance(per_turn, int) and isinstance(total, int) and isinstance(zero, int)):
+            continue
+        if total < per_turn:
+            what = f"is {total}, less than one turn"
+            yield Finding(("encoders", name, "total_counts"), what, f"write {per_turn} or more")
+        if zero >= total:
+            what = f"is {zero}, outside the range"
+            yield Finding(("encoders", name, "zero_counts"), what, f"write 0 to {total - 1}")
+
+
+def _unused(data: dict[str, Any]) -> Iterator[Finding]:
+    vehicle = part(data, "vehicle")
+    if not vehicle:
+        return
+    for key, kind in REFERENCES.items():
+        names = vehicle.get(key)
+        for name in part(data, kind):
+            if isinstance(names, list) and name not in names:
+                what = f"is not named in vehicle.{key}"
+                yield Finding((kind, name), what, "the vehicle's motions do not use it", warning=True)
