@@ -1,0 +1,185 @@
+"""``canhelm profile``: list, show, check and begin robot profiles."""
+
+from __future__ import annotations
+
+import json as json_text
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import msgspec
+from cyclopts import App, Parameter
+
+from canhelm.errors import ConfigError, Refused, UsageError
+from daemon.cli.output import Json, say, show, wants_json, words
+from profiles.loader import CALIBRATION, SHIPPED, LoadedProfile, ProfileError, available, find, load
+from profiles.provenance import Path_, dotted
+from profiles.schema import SCHEMA_VERSION
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+app = App(name="profile", help="Profiles of robots: list, show, check, begin a new one.")
+
+DEFAULT = "default"
+"""Origin of a value that no file gives."""
+_SHIPPED_ROOT = f"{SHIPPED.parent}/"
+
+_NEW = """\
+# {name}: what differs from {base} stands here; `canhelm profile show {base} --effective` lists what there is.
+schema_version: {version}
+name: {name}
+extends: {base}
+
+# drives:
+#   rear_right: {{node: 11, wheel_radius_m: 0.105}}
+# limits:
+#   speed_m_s: 0.8
+"""
+
+
+@app.command(name="list")
+def list_(*, json: Json = None) -> None:
+    """The profiles that can be used by name.
+
+    Example: `canhelm profile list`
+    """
+    show([_summary(path) for path in available()], table=_table, json=json)
+
+
+@app.command(name="show")
+def show_(name: str, /, *, effective: Annotated[bool, Parameter(negative=())] = False, json: Json = None) -> None:
+    """What a profile says; assumed values are marked.
+
+    Example: `canhelm profile show max2d --effective`
+
+    Args:
+        name: Name of a profile, or a YAML file.
+        effective: Every value with where it comes from: file and line, or the default.
+    """
+    loaded = load(name)
+    rows = list(_rows(loaded))
+    show(rows if effective else [row for row in rows if _is_own(row, loaded.path)], table=_table, json=json)
+
+
+@app.command
+def check(file: str, /, *, json: Json = None) -> None:
+    """Check a profile and name file and line of every mistake (exit code 7).
+
+    Example: `canhelm profile check myrobot.yaml`
+
+    Args:
+        file: A YAML file, or the name of a profile.
+    """
+    try:
+        loaded = load(file)
+    except ProfileError as error:
+        if wants_json(json):
+            show([_mistake_row(error, index) for index in range(len(error.mistakes))], json=True)
+        raise
+    for warning in loaded.warnings:
+        say(f"warning: {warning}")
+    show({"valid": True, **_counts(loaded), "file": str(loaded.path)}, json=json)
+
+
+@app.command
+def schema() -> None:
+    """JSON Schema of a profile, for editors.
+
+    Example: `canhelm profile schema > canhelm.schema.json`
+    """
+    from profiles.json_schema import json_schema
+
+    print(json_text.dumps(json_schema(), indent=2))
+
+
+@app.command
+def new(name: str, /, *, extends: str = "max2d", out: Path | None = None) -> None:
+    """Begin a profile of your own that extends another one.
+
+    Example: `canhelm profile new lab1 --extends max2d --out lab1.yaml`
+
+    Args:
+        name: Name of the robot.
+        extends: Name of the profile to begin with.
+        out: File to write; the default is to print it.
+    """
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]{0,39}", name):
+        raise UsageError(
+            f"{name!r} is no name of a robot", value=name, remedy="begin with a letter; use A-Z a-z 0-9 _ -"
+        )
+    find(extends)
+    text = _NEW.format(name=name, base=extends, version=SCHEMA_VERSION)
+    if out is None:
+        print(text, end="")
+        return
+    try:
+        with out.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except OSError as error:
+        raise Refused(
+            f"{out} cannot be written: {error.strerror}", value=str(out), remedy="choose another --out"
+        ) from error
+    say(f"{out} is written; check it with: canhelm profile check {out}")
+
+
+def _summary(path: Path) -> dict[str, Any]:
+    """One line of ``profile list``."""
+    try:
+        loaded = load(path)
+    except ConfigError as error:
+        return {
+            "name": path.stem,
+            "valid": False,
+            "description": error.message.splitlines()[0].rstrip(":"),
+            "file": str(path),
+        }
+    profile = loaded.profile
+    return {"name": path.stem, "valid": True, "description": profile.description, "file": str(path)}
+
+
+def _counts(loaded: LoadedProfile) -> dict[str, Any]:
+    profile = loaded.profile
+    parts = {"drives": len(profile.drives), "encoders": len(profile.encoders), "brakes": len(profile.brakes)}
+    values = {"values": len(loaded.origin), "assumed_values": len(loaded.assumed), "warnings": len(loaded.warnings)}
+    return {"name": profile.name, **parts, **values}
+
+
+def _rows(loaded: LoadedProfile) -> Iterator[dict[str, Any]]:
+    """Every value of a profile with its origin."""
+    for field, value in _flat(msgspec.to_builtins(loaded.profile)):
+        origin = loaded.origin.get(field, DEFAULT)
+        yield {"field": field, "value": value, "assumed": field in loaded.assumed, "origin": origin}
+
+
+def _flat(value: Any, path: Path_ = ()) -> Iterator[tuple[str, Any]]:
+    if not isinstance(value, dict | list | tuple):
+        yield dotted(path), value
+        return
+    children = value.items() if isinstance(value, dict) else enumerate(value)
+    for step, child in children:
+        yield from _flat(child, (*path, step))
+
+
+def _is_own(row: dict[str, Any], path: Path) -> bool:
+    """True for a value that the robot's own file or its calibration gives."""
+    return row["origin"].rpartition(":")[0] in (str(path), str(path.with_name(path.stem + CALIBRATION)))
+
+
+def _mistake_row(error: ProfileError, index: int) -> dict[str, Any]:
+    mistake = error.mistakes[index]
+    where = {"place": str(mistake.place), "file": mistake.place.file, "line": mistake.place.line}
+    return {"field": mistake.field, "mistake": mistake.what, "remedy": mistake.remedy, **where}
+
+
+def _table(rows: list[dict[str, Any]]) -> Table:
+    """A column a key, a line a row; shipped files are named from ``profiles/`` on."""
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    for column in rows[0] if rows else ():
+        table.add_column(column, overflow="fold")
+    for row in rows:
+        table.add_row(*(words(value, digits=6).removeprefix(_SHIPPED_ROOT) for value in row.values()))
+    return table
