@@ -150,6 +150,11 @@ def _leaves(root: type[CanhelmError]) -> dict[str, type[CanhelmError]]:
     return found
 
 
+def all_errors() -> list[type[CanhelmError]]:
+    """Every class of the tree, the root first."""
+    return list(_leaves(CanhelmError).values())
+
+
 def from_rpc(error: dict[str, Any]) -> CanhelmError:
     """The exception for a JSON-RPC error object; unknown types become a plain :class:`CanhelmError`."""
     data = error.get("data")

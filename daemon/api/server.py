@@ -1,0 +1,224 @@
+"""The socket server: JSON-RPC 2.0, one object a line, on a Unix socket.
+
+Whatever a client sends or fails to do, the daemon lives: nonsense is answered, a client that hangs up loses its lease,
+one that stops reading loses samples and then its connection.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import shutil
+import socket
+import stat
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from canhelm import protocol
+from canhelm.errors import ConfigError, PermissionRefused, Refused
+from daemon.api.connection import Connection
+
+LOGGER = logging.getLogger("canhelm.api")
+MAX_CLIENTS = 32
+RESERVED_CLIENTS = 8
+"""Further clients that may only stop: a crowd must not keep anybody from stopping the robot."""
+GROUP = "canhelm"
+
+
+class Backend(Protocol):
+    """What the server asks of the daemon behind it."""
+
+    robot: str
+    events: list[Callable[[dict[str, Any]], None]]
+    """Callbacks that hear of each event."""
+
+    @property
+    def state(self) -> str:
+        """State of the vehicle."""
+        ...
+
+    @property
+    def lease_timeout_s(self) -> float:
+        """How long a motion goes on without a renewal."""
+        ...
+
+    def status(self) -> dict[str, Any]:
+        """State at a glance, for JSON."""
+        ...
+
+    def open_lease(self, client: str) -> str:
+        """A lease for a client that is about to move something; returns its id."""
+        ...
+
+    def renew_lease(self, lease: str) -> None:
+        """Keep a lease alive. Raises Refused where it has run out."""
+        ...
+
+    def close_lease(self, lease: str) -> None:
+        """The client is gone: its motions stop."""
+        ...
+
+    async def call(self, method: str, params: dict[str, Any], lease: str | None) -> dict[str, Any]:
+        """Carry out a method with validated parameters. Raises CanhelmError leaves."""
+        ...
+
+
+@dataclass(slots=True)
+class Counters:
+    """What the server has seen.
+
+    Attributes:
+        clients: connected now.
+        requests: lines that were requests.
+        malformed: lines that were not.
+        lost_samples: status samples and events not sent to clients that read too slowly.
+        dropped_clients: connections ended because of what the client did or did not do.
+        internal_errors: requests that failed by a defect of the daemon (each is logged with its traceback).
+    """
+
+    clients: int = 0
+    requests: int = 0
+    malformed: int = 0
+    lost_samples: int = 0
+    dropped_clients: int = 0
+    internal_errors: int = 0
+
+
+class Server:
+    """The daemon's end of the socket.
+
+    Args:
+        backend: what carries the methods out.
+        path: where to listen.
+    """
+
+    def __init__(self, backend: Backend, path: Path) -> None:
+        self.backend = backend
+        self.path = path
+        self.counters = Counters()
+        self.connections: set[Connection] = set()
+        self.tasks: set[asyncio.Task[None]] = set()
+        self._server: asyncio.Server | None = None
+        self._inode = 0
+
+    async def start(self) -> None:
+        """Open the socket.
+
+        Raises:
+            Refused: another daemon answers there.
+            ConfigError: the path cannot be used.
+            PermissionRefused: this user may not create it.
+        """
+        listener = open_listener(self.path)
+        self._inode = os.stat(self.path).st_ino
+        self._server = await asyncio.get_running_loop().create_unix_server(self._accept, sock=listener)
+        self.backend.events.append(self._on_event)
+
+    async def close(self) -> None:
+        """Hang up on everybody and take the socket away."""
+        if self._server is None:
+            return
+        self.backend.events.remove(self._on_event)
+        self._server.close()
+        for connection in list(self.connections):
+            connection.end()
+        for task in list(self.tasks):
+            task.cancel()
+        if self.tasks:
+            await asyncio.wait(list(self.tasks))
+        self._remove_socket()
+
+    def _remove_socket(self) -> None:
+        try:
+            if os.stat(self.path).st_ino == self._inode:
+                os.unlink(self.path)
+        except FileNotFoundError:
+            pass
+
+    def status(self) -> dict[str, Any]:
+        """The backend's status with the server's own counters."""
+        return {**self.backend.status(), "api": asdict(self.counters)}
+
+    def _accept(self) -> Connection:
+        return Connection(self, crowded=len(self.connections) >= MAX_CLIENTS)
+
+    def admit(self, connection: Connection) -> bool:
+        """Take a new connection in, unless there are too many even for stopping."""
+        if len(self.connections) >= MAX_CLIENTS + RESERVED_CLIENTS:
+            self.counters.dropped_clients += 1
+            return False
+        self.connections.add(connection)
+        self.counters.clients = len(self.connections)
+        return True
+
+    def leave(self, connection: Connection) -> None:
+        """A connection has ended."""
+        self.connections.discard(connection)
+        self.counters.clients = len(self.connections)
+
+    def _on_event(self, event: dict[str, Any]) -> None:
+        line = protocol.make_notification("event", event)
+        for connection in self.connections:
+            if connection.subscribed:
+                connection.publish(line)
+
+
+def open_listener(path: Path) -> socket.socket:
+    """A listening socket at a path, 0660, of the group canhelm where there is one; a dead daemon's is replaced.
+
+    Raises:
+        Refused: another daemon answers there.
+        ConfigError: the path is too long or taken by something that is no socket.
+        PermissionRefused: this user may not create it.
+    """
+    try:
+        _own_folder(path.parent)
+        _clear_stale(path)
+        listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        before = os.umask(0o117)
+        try:
+            listener.bind(os.fspath(path))
+        finally:
+            os.umask(before)
+    except PermissionError as error:
+        raise PermissionRefused(
+            f"no socket can be opened at {path}: {error.strerror}", remedy="choose another place with --socket PATH"
+        ) from None
+    except OSError as error:
+        raise ConfigError(
+            f"no socket can be opened at {path}: {error.strerror or error}",
+            remedy="choose another place with --socket PATH (at most 107 characters)",
+        ) from None
+    _give_to_group(path)
+    return listener
+
+
+def _own_folder(folder: Path) -> None:
+    """Make the folder; a shared place such as /tmp must not hold one that somebody else has put there."""
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    if folder == protocol.user_folder():
+        found = os.lstat(folder)
+        if found.st_uid != os.getuid() or not stat.S_ISDIR(found.st_mode):
+            raise PermissionRefused(f"{folder} belongs to somebody else", remedy="choose a place with --socket PATH")
+
+
+def _clear_stale(path: Path) -> None:
+    try:
+        mode = os.lstat(path).st_mode
+    except FileNotFoundError:
+        return
+    if not stat.S_ISSOCK(mode):
+        raise ConfigError(f"{path} is there and is no socket", remedy="choose another place with --socket PATH")
+    if protocol.is_live(path):
+        raise Refused(f"a daemon already answers on {path}", remedy="stop it first, or give this one --socket PATH")
+    os.unlink(path)
+
+
+def _give_to_group(path: Path) -> None:
+    try:
+        shutil.chown(path, group=GROUP)
+    except (LookupError, PermissionError):
+        LOGGER.info("group %s is not there or not ours: %s stays with this user's group", GROUP, path)

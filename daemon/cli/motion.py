@@ -1,0 +1,89 @@
+"""Carrying out a motion from the command line: wait, show progress on a terminal, stop it when interrupted."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any
+
+from canhelm.client import Client
+from daemon.cli.options import Options
+from daemon.cli.output import say, show, words
+
+INTERRUPTED = 130
+PROGRESS_HZ = 5.0
+CLEAR_LINE = "\r\x1b[K"
+
+
+def run_motion(options: Options, method: str, *, no_wait: bool = False, **params: Any) -> int:
+    """Call a motion's method and print its result.
+
+    Args:
+        options: which daemon, and how to print.
+        method: as in ``api.schema``.
+        no_wait: hand the motion to the daemon and print its id.
+        params: the method's parameters.
+
+    Returns:
+        The exit code: 0, or 130 where a signal interrupted it and the motion was stopped.
+    """
+    with options.client() as client:
+        if no_wait:
+            show(client.call(method, wait=False, **params), json=options.json)
+            return 0
+        try:
+            with signals_interrupt(), progress_line(client):
+                result = client.call(method, **params)
+        except KeyboardInterrupt:
+            state = client.call("lease.close").get("state", "unknown")
+            say(f"interrupted: the motion was stopped (vehicle: {state})")
+            return INTERRUPTED
+        show(result, json=options.json)
+    return 0
+
+
+@contextmanager
+def signals_interrupt() -> Iterator[None]:
+    """SIGINT (even where a shell had it ignored, as for background jobs) and SIGTERM raise KeyboardInterrupt."""
+    before = {number: signal.signal(number, _interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
+@contextmanager
+def progress_line(client: Client) -> Iterator[None]:
+    """One line on stderr that follows the motion, and the daemon's warnings above it; nothing off a terminal."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    client.on_notification = _draw
+    client.call("subscribe", rate_hz=PROGRESS_HZ)
+    try:
+        yield
+    finally:
+        client.on_notification = None
+        print(CLEAR_LINE, end="", file=sys.stderr, flush=True)
+
+
+def _draw(method: str, params: dict[str, Any]) -> None:
+    if method == "status":
+        print(f"{CLEAR_LINE}{progress_text(params)[:100]}", end="", file=sys.stderr, flush=True)
+    elif method == "event" and params.get("severity") != "info":
+        print(CLEAR_LINE, end="", file=sys.stderr)
+        say(str(params.get("message")))
+
+
+def progress_text(status: dict[str, Any]) -> str:
+    """The state and what the motion reports of itself, in one line."""
+    motion = status.get("motion") or next(iter(status.get("motions") or ()), None)
+    return f"{status.get('state')}  {words(motion, digits=3)}" if motion else str(status.get("state"))

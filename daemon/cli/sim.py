@@ -1,0 +1,25 @@
+"""``canhelm sim``: what one does by hand to a real network, done to the simulated one."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from cyclopts import App, Parameter
+
+from daemon.cli.options import DEFAULT, Options, node_of
+from daemon.cli.output import show
+
+app = App(name="sim", help="Do things to the simulated network.")
+
+NodeOrAll = Annotated[str, Parameter(help="Node id (1 to 127), a name from the profile, or all.")]
+
+
+@app.command
+def power(node: NodeOrAll, state: Literal["on", "off"], /, *, options: Options = DEFAULT) -> None:
+    """Switch the supply of a simulated node.
+
+    Example: `canhelm sim power 3 off`
+    """
+    wanted = node_of(node)
+    with options.client() as client:
+        show(client.call("simulation.power", node=wanted, on=state == "on"), json=options.json)

@@ -1,0 +1,19 @@
+"""``canhelm steer``."""
+
+from __future__ import annotations
+
+from daemon.cli.motion import run_motion
+from daemon.cli.options import DEFAULT, NoWait, Options, Pair
+
+
+def steer(pair: Pair, angle_deg: float, /, *, no_wait: NoWait = False, options: Options = DEFAULT) -> int:
+    """Turn a pair of wheels to a heading, the other pair braked.
+
+    Example: `canhelm steer front -30`
+
+    Parameters
+    ----------
+    angle_deg: float
+        Heading of the wheels in the robot's frame, counter-clockwise positive.
+    """
+    return run_motion(options, "steer", no_wait=no_wait, pair=pair, angle_deg=angle_deg)

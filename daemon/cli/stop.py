@@ -1,0 +1,38 @@
+"""``canhelm stop``, ``estop`` and ``reset``."""
+
+from __future__ import annotations
+
+from daemon.cli.options import DEFAULT, Options
+from daemon.cli.output import show
+
+
+def stop(*, options: Options = DEFAULT) -> None:
+    """Stop everything now, whoever moves it; returns when the robot is at rest.
+
+    Example: `canhelm stop`
+    """
+    with options.client() as client:
+        show(client.call("stop"), json=options.json)
+
+
+def estop(*, reason: str | None = None, options: Options = DEFAULT) -> None:
+    """Emergency stop: quick stop, power stages off, latched until `canhelm reset`.
+
+    Example: `canhelm estop --reason "somebody in the way"`
+
+    Parameters
+    ----------
+    reason: str
+        Why, for those who read the status later.
+    """
+    with options.client() as client:
+        show(client.call("estop", reason=reason), json=options.json)
+
+
+def reset(*, options: Options = DEFAULT) -> None:
+    """Clear an emergency stop and the faults of all drives, once their causes are gone.
+
+    Example: `canhelm reset`
+    """
+    with options.client() as client:
+        show(client.call("reset"), json=options.json)
