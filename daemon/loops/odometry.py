@@ -1,0 +1,113 @@
+"""Where the robot is, from what its wheels have rolled and where its pairs point."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from daemon.loops.geometry import PAIR_OF_WHEEL, TURN_SIGN, WHEELS_OF_PAIR, PerPair, contact_points
+from daemon.loops.measurement import Measurement
+from profiles.schema import PairedSteerGeometry
+
+MAX_STEP_M: Final = 0.5
+"""A wheel that seems to have rolled farther since the last reading was counted anew, or its reading is wrong."""
+MAX_TURN_RAD: Final = 0.5
+"""The same for the heading of a pair."""
+
+Row = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Position and attitude of the robot's centre in the frame where the odometry was reset."""
+
+    x_m: float = 0.0
+    y_m: float = 0.0
+    yaw_rad: float = 0.0
+
+
+def moved_along_arc(pose: Pose, forward_m: float, left_m: float, turn_rad: float) -> Pose:
+    """The pose after a motion with a constant twist: exact on arcs and on lines.
+
+    With s = sin(t)/t and c = (1 - cos t)/t the displacement in the frame of the start is
+    (s dx - c dy, c dx + s dy), which is the exponential map of the plane's rigid motions.
+    """
+    if abs(turn_rad) < 1e-6:
+        s, c = 1.0, turn_rad / 2
+    else:
+        s, c = math.sin(turn_rad) / turn_rad, (1 - math.cos(turn_rad)) / turn_rad
+    ahead, aside = s * forward_m - c * left_m, c * forward_m + s * left_m
+    cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    return Pose(pose.x_m + cos * ahead - sin * aside, pose.y_m + sin * ahead + cos * aside, pose.yaw_rad + turn_rad)
+
+
+class Odometry:
+    """Adds up wheel travel to a pose.
+
+    Between two readings the body's motion (dx, dy, dyaw) is the least-squares answer to six statements: each of the
+    four wheels has rolled what it says along its heading at its contact point, and midway between the contact points
+    of each pair nothing moves sideways. (Single wheels do slip sideways on a curve, the two of a pair by the same
+    amount in opposite directions.) What a pair's wheels roll to turn the pair is taken off before.
+
+    Attributes:
+        pose: where the robot's centre is.
+        skipped: readings that were not used because they cannot be true.
+    """
+
+    def __init__(self, geometry: PairedSteerGeometry) -> None:
+        self._geometry = geometry
+        self._last: Measurement | None = None
+        self.pose = Pose()
+        self.skipped = 0
+
+    def reset(self, pose: Pose | None = None) -> None:
+        """Start again at ``pose`` (default: the origin)."""
+        self.pose = Pose() if pose is None else pose
+
+    def update(self, measurement: Measurement) -> Pose:
+        """Take one cycle's wheel travel and headings; the first one only sets the start."""
+        last, self._last = self._last, measurement
+        if last is None:
+            return self.pose
+        rolled = [new - old for new, old in zip(measurement.wheel_travel_m, last.wheel_travel_m, strict=True)]
+        turned = [new - old for new, old in zip(measurement.heading_rad, last.heading_rad, strict=True)]
+        if not (all(abs(way) <= MAX_STEP_M for way in rolled) and all(abs(turn) <= MAX_TURN_RAD for turn in turned)):
+            self.skipped += 1
+            return self.pose
+        if any(rolled) or any(turned):
+            mean = (last.heading_rad[0] + turned[0] / 2, last.heading_rad[1] + turned[1] / 2)
+            self.pose = moved_along_arc(self.pose, *self._body_motion(mean, rolled, turned))
+        return self.pose
+
+    def _body_motion(self, heading_rad: PerPair, rolled_m: list[float], turned_rad: list[float]) -> Row:
+        contact = contact_points(self._geometry, *heading_rad)
+        rows: list[Row] = []
+        values: list[float] = []
+        for wheel, pair in enumerate(PAIR_OF_WHEEL):
+            cos, sin = math.cos(heading_rad[pair]), math.sin(heading_rad[pair])
+            x, y = contact[wheel]
+            rows.append((cos, sin, x * sin - y * cos))
+            values.append(rolled_m[wheel] - TURN_SIGN[wheel] * self._geometry.contact_offset_m * turned_rad[pair])
+        for pair, (first, second) in enumerate(WHEELS_OF_PAIR):
+            cos, sin = math.cos(heading_rad[pair]), math.sin(heading_rad[pair])
+            x = (contact[first][0] + contact[second][0]) / 2
+            y = (contact[first][1] + contact[second][1]) / 2
+            rows.append((-sin, cos, x * cos + y * sin))
+            values.append(0.0)
+        return _least_squares(rows, values)
+
+
+def _least_squares(rows: list[Row], values: list[float]) -> Row:
+    """Solution of the normal equations of three unknowns by Cramer's rule."""
+    a, b, c, d, e, f = (
+        sum(row[i] * row[k] for row in rows) for i, k in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+    )
+    p, q, r = (sum(row[i] * value for row, value in zip(rows, values, strict=True)) for i in range(3))
+    minor_a, minor_b, minor_c = d * f - e * e, c * e - b * f, b * e - c * d
+    determinant = a * minor_a + b * minor_b + c * minor_c
+    return (
+        (minor_a * p + minor_b * q + minor_c * r) / determinant,
+        (minor_b * p + (a * f - c * c) * q + (b * c - a * e) * r) / determinant,
+        (minor_c * p + (b * c - a * e) * q + (a * d - b * b) * r) / determinant,
+    )
