@@ -1,0 +1,272 @@
+"""The boot-up of one node, for ever: wait for it, configure it, prove it, start it, guard it; again when it comes back.
+
+In the spirit of CiA 302-2 (boot slave): each step has a name, each attempt a deadline, each failure a sentence, and
+there is always a next attempt.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+
+from canhelm.errors import Aborted, DeviceFault, NodeAbsent, Refused, Timeout
+from drivers.canopen.codes import NmtCommand, NmtState
+from drivers.canopen.device import CanopenDevice, Step
+from drivers.canopen.emcy import EMCY_COB_ID, parse_emcy
+from drivers.canopen.master import Master
+from drivers.canopen.nmt import ERROR_CONTROL_COB_ID, parse_error_control
+from drivers.contract import NodeState
+
+LOGGER = logging.getLogger("canhelm")
+
+FIRST_PAUSE_S = 0.1
+LONGEST_PAUSE_S = 1.0
+REFUSED_PAUSE_S = 2.0
+"""Time before a device that was refused is looked at again."""
+DEVICE_TYPE = (0x1000, 0)
+STATE_WORDS = {int(state): state.name.lower().replace("_", "-") for state in NmtState}
+
+
+class _Restarted(Exception):
+    """The node restarted while it was configured."""
+
+
+class NodeBoot:
+    """Boots one device and keeps it booted.
+
+    Args:
+        master: the master of its bus.
+        device: what stands on the node.
+    """
+
+    def __init__(self, master: Master, device: CanopenDevice) -> None:
+        self._master = master
+        self._device = device
+        self._node = device.node
+        self._who = device.who
+        self._sign_of_life = asyncio.Event()
+        self._gone = asyncio.Event()
+        self._held = False
+        self._restarted = False
+        self._guarded: asyncio.Future[None] | None = None
+        self._wrong_toggle = False
+        self._last_told = ""
+        self._task: asyncio.Task[None] | None = None
+        self._guard = master.guard(self._node, self._on_lost)
+        master.subscribe(ERROR_CONTROL_COB_ID + self._node, self._on_error_control)
+        master.subscribe(EMCY_COB_ID + self._node, self._on_emcy)
+        master.on_command(self._node, self._on_command)
+
+    def start(self) -> None:
+        """Begin, on the running loop."""
+        self._task = asyncio.get_running_loop().create_task(self._run(), name=f"boot {self._who}")
+
+    async def close(self) -> None:
+        """End; the node is no longer guarded."""
+        self._guard.disarm()
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.wait([self._task])
+
+    # --- the life of a node --------------------------------------------------------------------------------------
+
+    async def _run(self) -> None:
+        while True:
+            try:
+                await self._one_life()
+            except Exception as error:  # a task's edge: a mistake of ours must not leave a node alone
+                LOGGER.exception("boot-up of %s", self._who)
+                self._master.counters.internal_errors += 1
+                self._fail(
+                    NodeState.ABSENT, "lost", "error", f"{self._who}: internal error: {error!r}", "report the log"
+                )
+                await asyncio.sleep(LONGEST_PAUSE_S)
+
+    async def _one_life(self) -> None:
+        """From waiting for the node to losing it, or to the next attempt."""
+        await self._wait_for_node()
+        try:
+            await self._configure()
+        except (Refused, Aborted, DeviceFault) as error:
+            self._fail(NodeState.REFUSED, "refused", "error", error.message, error.remedy or "")
+            await self._pause(REFUSED_PAUSE_S)
+        except (NodeAbsent, Timeout) as error:
+            self._fail(
+                NodeState.CONFIGURING, "waiting", "warning", self._failed_step(error.message), error.remedy or ""
+            )
+            await self._pause(FIRST_PAUSE_S)
+        except _Restarted:
+            self._fail(NodeState.CONFIGURING, "rebooted", "warning", self._failed_step("it restarted"), "")
+        else:
+            self._ready()
+            await self._gone.wait()
+
+    async def _wait_for_node(self) -> None:
+        pause_s = FIRST_PAUSE_S
+        while self._held or not await self._answers():
+            if self._held:
+                name = self._device.name
+                self._say("waiting", f"{self._who} is held by command; `canhelm nmt start {name}` brings it back")
+                self._sign_of_life.clear()
+            elif not self._sign_of_life.is_set():
+                self._device.node_state = NodeState.ABSENT
+                self._say("waiting", f"waiting for {self._who}: no boot-up; is motor power on?")
+            await self._pause(pause_s)
+            pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
+
+    async def _answers(self) -> bool:
+        """Take the node to pre-operational, alone, and see whether it answers (a stopped node would not)."""
+        self._restarted = False
+        self._sign_of_life.clear()
+        self._master.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, self._node)
+        try:
+            await self._device.sdo.read_raw(DEVICE_TYPE)
+        except Aborted:
+            return True
+        except (NodeAbsent, Timeout):
+            return False
+        return True
+
+    async def _pause(self, pause_s: float) -> None:
+        """Wait, at most until the node is heard of."""
+        try:
+            async with asyncio.timeout(pause_s):
+                await self._sign_of_life.wait()
+        except TimeoutError:
+            return
+
+    async def _configure(self) -> None:
+        self._gone.clear()
+        device = self._device
+        device.node_state = NodeState.CONFIGURING
+        start = Step("starting it", self._start)
+        guard = Step("waiting for its first guarding answer", self._first_guarding_answer)
+        try:
+            async with asyncio.timeout(self._master.network.boot_deadline_s):
+                for step in (*device.boot_steps(), start, guard, *device.start_steps()):
+                    device.status_sentence = f"{self._who}: {step.name}"
+                    await step.run()
+                    if self._restarted:
+                        raise _Restarted
+        except TimeoutError:
+            deadline_s = self._master.network.boot_deadline_s
+            remedy = "check the bus load and the control cycle with `canhelm status`"
+            raise Timeout(
+                f"not done {deadline_s:g} s after its boot-up began", node=self._node, remedy=remedy
+            ) from None
+        except NodeAbsent:
+            if self._restarted:
+                raise _Restarted from None
+            raise
+
+    async def _start(self) -> None:
+        self._master.send_nmt(NmtCommand.START, self._node)
+
+    async def _first_guarding_answer(self) -> None:
+        loop = asyncio.get_running_loop()
+        self._guarded = loop.create_future()
+        self._guard.arm(loop.time())
+        try:
+            await self._guarded
+        finally:
+            self._guarded = None
+
+    def _ready(self) -> None:
+        self._last_told = ""
+        device = self._device
+        device.node_state = NodeState.READY
+        device.status_sentence = f"{self._who} is ready"
+        device.on_ready()
+        self._master.tell(self._node, "ready", "info", f"{self._who} is configured, started and guarded")
+
+    def _failed_step(self, reason: str) -> str:
+        return f"{self._device.status_sentence} failed: {reason}"
+
+    def _fail(self, state: NodeState, kind: str, severity: str, message: str, remedy: str) -> None:
+        self._guard.disarm()
+        self._device.node_state = state
+        self._say(kind, message, severity, remedy)
+
+    def _say(self, kind: str, message: str, severity: str = "info", remedy: str = "") -> None:
+        """Put a sentence into the status; it becomes an event when it is new."""
+        self._device.status_sentence = f"{message} ({remedy})" if remedy else message
+        if message != self._last_told:
+            self._last_told = message
+            self._master.tell(self._node, kind, severity, message, remedy)
+
+    # --- what is heard of the node -------------------------------------------------------------------------------
+
+    def _on_error_control(self, can_id: int, data: bytes, timestamp: float) -> None:
+        parsed = parse_error_control(data)
+        if parsed is None:
+            self._master.counters.malformed += 1
+            return
+        toggle, state = parsed
+        self._sign_of_life.set()
+        if state == NmtState.BOOT_UP:
+            self._on_boot_up()
+        else:
+            self._on_guarding_answer(toggle, state)
+
+    def _on_boot_up(self) -> None:
+        self._restarted = True
+        if self._device.node_state is NodeState.READY:
+            remedy = "check its supply if nobody switched it; it is configured again by itself"
+            self._leave("rebooted", f"{self._who} has restarted", remedy)
+        else:
+            self._master.tell(self._node, "boot_up", "info", f"boot-up of {self._who}")
+        self._device.sdo.give_up("restarted")
+
+    def _on_guarding_answer(self, toggle: int, state: int) -> None:
+        alternates = self._guard.answer(toggle, asyncio.get_running_loop().time())
+        if not alternates:
+            self._master.counters.toggle_errors += 1
+            if not self._wrong_toggle:
+                message = f"{self._who}: toggle bit of its guarding answer did not alternate"
+                self._master.tell(self._node, "toggle", "warning", message, "look for a second node with this id")
+        self._wrong_toggle = not alternates
+        if state == NmtState.OPERATIONAL:
+            if self._guarded is not None and not self._guarded.done():
+                self._guarded.set_result(None)
+        elif self._device.node_state is NodeState.READY:
+            words = STATE_WORDS.get(state, f"in state {state}")
+            self._leave("lost", f"{self._who} is no longer operational but {words}", "it is configured again by itself")
+
+    def _on_lost(self, silent_s: float) -> None:
+        message = f"{self._who} is lost: no guarding answer for {silent_s * 1e3:.0f} ms"
+        self._leave("lost", message, "check its motor power and the CAN cable; it is configured again when it is back")
+
+    def _leave(self, kind: str, message: str, remedy: str) -> None:
+        """The node was ready and is no longer."""
+        device = self._device
+        self._master.counters.nodes_lost += 1
+        self._guard.disarm()
+        self._gone.set()
+        device.fault = device.make_fault(0, message, remedy)
+        device.node_state = NodeState.ABSENT
+        device.status_sentence = message
+        device.on_lost(device.fault)
+        self._master.tell(self._node, kind, "error", message, remedy)
+
+    def _on_emcy(self, can_id: int, data: bytes, timestamp: float) -> None:
+        parsed = parse_emcy(data)
+        if parsed is None:
+            self._master.counters.malformed += 1
+            return
+        self._sign_of_life.set()
+        fault = self._device.on_emcy(*parsed)
+        if fault is None:
+            self._master.tell(self._node, "emcy", "info", f"{self._who} reports that its errors are gone")
+        else:
+            severity = "error" if self._device.node_state is NodeState.READY else "warning"
+            self._master.tell(self._node, "emcy", severity, fault.message, fault.remedy)
+
+    def _on_command(self, command: NmtCommand) -> None:
+        """A person commands the node: a stop holds it until a start or a reset."""
+        self._held = command in (NmtCommand.STOP, NmtCommand.ENTER_PRE_OPERATIONAL)
+        self._sign_of_life.set()
+        if self._held and self._device.node_state is NodeState.READY:
+            words = command.name.lower().replace("_", " ")
+            self._leave(
+                "lost", f"{self._who} left operation: NMT {words} by command", "`canhelm nmt start` brings it back"
+            )

@@ -1,0 +1,56 @@
+"""Writes objects to a node and proves by reading back that they are there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from canhelm.errors import Refused
+from drivers.canopen.objects import ObjectDef
+from drivers.canopen.sdo import SdoClient
+
+
+class Configuration:
+    """One attempt to configure a node.
+
+    Args:
+        sdo: the node's client.
+        who: the node for people.
+
+    Attributes:
+        written: last value written to each object.
+    """
+
+    def __init__(self, sdo: SdoClient, who: str) -> None:
+        self.written: dict[ObjectDef, int] = {}
+        self._sdo = sdo
+        self._who = who
+
+    async def write(self, settings: Iterable[tuple[ObjectDef, int]]) -> None:
+        """Write values in their order. Raises NodeAbsent, Timeout or Aborted."""
+        for entry, value in settings:
+            await self._sdo.write(entry, value)
+            self.written[entry] = value
+
+    async def expect(self, entry: ObjectDef, expected: int, remedy: str, mask: int = -1) -> None:
+        """Read one object and compare it under a mask. Raises Refused where it differs."""
+        found = await self._sdo.read_int(entry)
+        if found & mask != expected & mask:
+            raise Refused(
+                f"{self._who}: {entry.address} ({entry.name}) is {_words(found)}, expected {_words(expected)}",
+                node=self._sdo.node,
+                object=entry.address,
+                value=found,
+                limit=expected,
+                remedy=remedy,
+            )
+
+    async def verify(self) -> None:
+        """Read everything back that was written. Raises Refused at the first object that differs."""
+        for entry, expected in self.written.items():
+            await self.expect(
+                entry, expected, "switch the device off and on; if it happens again, check its type and firmware"
+            )
+
+
+def _words(value: int) -> str:
+    return f"{value} (0x{value:X})" if value > 9 else str(value)

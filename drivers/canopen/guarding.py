@@ -1,0 +1,98 @@
+"""Node guarding (CiA 301 7.2.8.3.2.1), paced by the control cycle: a cycle that hangs guards nobody.
+
+A node is asked once a guard time. An answer that is missing is asked for again after :data:`REPEAT_AFTER` of the guard
+time; two unanswered requests within :data:`LOST_AFTER` of it mean that the node is lost. So a node that dies right
+after an answer is known to be lost before two guard times are over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from drivers.bus.contract import RTR_FLAG
+from drivers.canopen.nmt import ERROR_CONTROL_COB_ID
+
+REPEAT_AFTER = 0.4
+LOST_AFTER = 0.8
+EARLY = 0.01
+"""Share of the guard time that a request may be early, so that rounding does not cost a whole control cycle."""
+PAUSE = 0.25
+"""Share of the guard time without a call after which the time in between counts as a pause of this program."""
+
+
+class Guard:
+    """Guards one node.
+
+    Args:
+        node: node id.
+        guard_time_s: time between two requests.
+        request: sends a remote frame with the COB-ID it is given.
+        on_lost: called once with the time since the last sign of life.
+    """
+
+    def __init__(
+        self,
+        node: int,
+        guard_time_s: float,
+        request: Callable[[int], None],
+        on_lost: Callable[[float], None],
+    ) -> None:
+        self.node = node
+        self.guard_time_s = guard_time_s
+        self._request = request
+        self._on_lost = on_lost
+        self._armed = False
+        self._called_s = 0.0
+        self._next_s = 0.0
+        self._asked_s: float | None = None
+        self._repeated = False
+        self._alive_s = 0.0
+        self._toggle: int | None = None
+
+    def arm(self, now_s: float) -> None:
+        """Guard from now on; the first request goes out with the next call of :meth:`due`."""
+        self._armed = True
+        self._called_s = self._next_s = self._alive_s = now_s
+        self._asked_s = None
+        self._toggle = None
+
+    def disarm(self) -> None:
+        """Ask no more."""
+        self._armed = False
+
+    def due(self, now_s: float) -> None:
+        """Send what is due; called by each good control cycle."""
+        if not self._armed:
+            return
+        self._forgive_pause(now_s)
+        asked_s, guard_time_s = self._asked_s, self.guard_time_s
+        if asked_s is None:
+            if now_s >= self._next_s - EARLY * guard_time_s:
+                self._ask(now_s)
+        elif now_s >= asked_s + LOST_AFTER * guard_time_s:
+            self._armed = False
+            self._on_lost(now_s - self._alive_s)
+        elif not self._repeated and now_s >= asked_s + REPEAT_AFTER * guard_time_s:
+            self._repeated = True
+            self._request(RTR_FLAG | ERROR_CONTROL_COB_ID + self.node)
+
+    def _forgive_pause(self, now_s: float) -> None:
+        """After a pause of this program an answer may wait unread: its time begins anew."""
+        pause_s = now_s - self._called_s
+        self._called_s = now_s
+        if self._asked_s is not None and pause_s > PAUSE * self.guard_time_s:
+            self._asked_s += pause_s
+
+    def _ask(self, now_s: float) -> None:
+        self._asked_s = now_s
+        self._next_s = now_s + self.guard_time_s
+        self._repeated = False
+        self._request(RTR_FLAG | ERROR_CONTROL_COB_ID + self.node)
+
+    def answer(self, toggle: int, now_s: float) -> bool:
+        """Take an answer; False where its toggle bit did not alternate. The first answer may have either."""
+        alternates = toggle != self._toggle
+        self._toggle = toggle
+        self._alive_s = now_s
+        self._asked_s = None
+        return alternates
