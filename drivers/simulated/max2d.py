@@ -1,42 +1,28 @@
-"""Body and wheel pairs of the MAX2D as rigid bodies on a plane, driven by the forces of the four tyres.
+"""The MAX2D as a rigid body on a level floor, driven by the forces of its four tyres.
 
-Symbols, in the body's frame (x forward, y left, origin in the centre): velocity ``(vx, vy)``, yaw rate ``w``, and per
-pair its heading ``p`` and rate ``dp/dt`` relative to the body. Steering axes stand at ``(X, Y) = (-+l/2, -+h/2)``. In
-the frame that turns with a pair, a contact point lies at ``(B, A)`` from its steering axis: ``B = +b`` in front and
-``-b`` at the rear, ``A = +a`` left and ``-a`` right. A belt couples both wheels of a pair, so one heading is enough.
-
-Velocity of a contact point along and left of the heading, with the pair's rate of turn in space ``W = w + dp/dt``::
-
-    v_roll = (vx - w Y) cos p + (vy + w X) sin p - W A
-    v_lat  = (vy + w X) cos p - (vx - w Y) sin p + W B
-
-Equations of motion (Lagrange with the coordinates x, y, yaw, p_rear, p_front). ``J`` is the moment of inertia of the
-whole robot, ``I`` that of one pair about its axes; the wheels' static moments about the axes cancel within a pair, save
-for the few millimetres of b. Every contact force F = (F_roll, F_lat) does work on the velocity of its contact point::
+With the velocities and torques of :mod:`drivers.simulated.wheel_pair`, mass m, the moment of inertia J of the whole
+robot about its centre, and I of one pair about its steering axes (Lagrange with the coordinates x, y, yaw and the two
+headings; the wheels' static moments about the axes cancel within a pair, save for the few millimetres of b)::
 
     m a = sum F
-    I (dw/dt + d2p/dt2) = N - Q                        N = sum (B F_lat - A F_roll)
     (J - 2 I) dw/dt = sum (X F_y - Y F_x) + sum Q
 
-So a force reaches the body through the bearing of its steering axis, and its moment about that axis, N, either turns
-the pair or is passed on to the body as Q, the torque of brake, dry friction and stop. Q is what would keep the pair
-from turning during a step of length h, ``N + I (dp/dt) / h``, cut to what brake and friction can hold: a held pair has
-``dp/dt = 0`` and passes everything on, so its I moves with the body and the body's inertia is J.
-
-The wheels' moment of spin does not steer, and a contact patch that turns on the spot has no drilling moment of its
-own; take that as part of the steering axes' dry friction.
+A held pair has ``Q = N - I dw/dt``, so its inertia moves to the left side and its whole moment N acts on the body.
+Wheel loads are quasi-static: a quarter of the weight, shifted by the body's acceleration and the height of its centre
+of mass.
 """
 
 from __future__ import annotations
 
-from math import copysign, cos, inf, radians, sin
+from math import atan, cos, sin
 from random import Random
 
 from canhelm.errors import ConfigError
 from drivers.simulated.motor import WheelDrive
 from drivers.simulated.tyre import Contact
+from drivers.simulated.wheel_pair import Pair, Wheel
 from drivers.simulated.world import STEP_S, Axis
-from profiles.schema import BrakeConfig, PairedSteerGeometry, Profile, SimulationConfig
+from profiles.schema import PairedSteerGeometry, Profile, SimulationConfig
 
 GRAVITY_M_S2 = 9.81
 LOAD_SHIFT_S = 0.05
@@ -45,139 +31,6 @@ REST_SPEED = 1e-5
 """Speed [m/s, rad/s] below which a motion counts as rest."""
 REST_STEPS = 50
 """Steps at rest, half a swing of the body on its tyres, after which the world stands still."""
-
-
-class Wheel:
-    """One wheel: tyre, motor with gear, load."""
-
-    __slots__ = ("contact", "drive", "load_n")
-
-    def __init__(self, drive: WheelDrive, contact: Contact, load_n: float) -> None:
-        self.drive = drive
-        self.contact = contact
-        self.load_n = load_n
-
-
-class Pair:
-    """Two wheels that steer together: one heading, one brake.
-
-    Args:
-        geometry: geometry of the vehicle.
-        simulation: inertia, friction and brake of the pair.
-        side: +1 for the front pair, -1 for the rear pair.
-        right: the right wheel.
-        left: the left wheel.
-    """
-
-    __slots__ = (
-        "_arm_m",
-        "_brake_n_m",
-        "_cos",
-        "_friction_n_m",
-        "_half_track_m",
-        "_holding_n_m",
-        "_lead_m",
-        "_push_n_m",
-        "_sin",
-        "_stop_rad",
-        "force_x_n",
-        "force_y_n",
-        "heading_rad",
-        "held",
-        "inertia_kg_m2",
-        "left",
-        "offset_m",
-        "passed_n_m",
-        "rate_rad_s",
-        "right",
-        "yaw_moment_n_m",
-    )
-
-    def __init__(
-        self, geometry: PairedSteerGeometry, simulation: SimulationConfig, side: int, right: Wheel, left: Wheel
-    ) -> None:
-        self.right = right
-        self.left = left
-        self.heading_rad = 0.0
-        self.rate_rad_s = 0.0
-        """Rate of turn relative to the body."""
-        self.held = True
-        """Whether brake, friction or stop kept the pair from turning in the last step."""
-        self.inertia_kg_m2 = simulation.steering_inertia_kg_m2
-        self.offset_m = side * geometry.wheelbase_m / 2.0
-        self.force_x_n = 0.0
-        self.force_y_n = 0.0
-        self.yaw_moment_n_m = 0.0
-        """Moment of the bearings' forces about the body's centre."""
-        self.passed_n_m = 0.0
-        """Torque about the steering axes that is passed on to the body."""
-        self._arm_m = geometry.contact_offset_m
-        self._lead_m = side * geometry.contact_lead_m
-        self._half_track_m = geometry.pivot_track_m / 2.0
-        self._stop_rad = radians(geometry.max_heading_deg)
-        self._friction_n_m = simulation.steering_friction_n_m
-        self._brake_n_m = simulation.brake_holding_torque_n_m
-        self._holding_n_m = self._friction_n_m
-        self._push_n_m = 0.0
-        self._cos = 1.0
-        self._sin = 0.0
-
-    def set_brake(self, engaged: bool) -> None:
-        """Engage or release the pair's brake."""
-        self._holding_n_m = self._friction_n_m + (self._brake_n_m if engaged else 0.0)
-
-    def place(self, heading_rad: float) -> None:
-        """Put the pair at a heading."""
-        self.heading_rad = heading_rad
-        self._cos = cos(heading_rad)
-        self._sin = sin(heading_rad)
-
-    def roll(self, vx: float, vy: float, yaw_rate: float, dt_s: float) -> None:
-        """Roll both wheels for one step: deform the tyres, turn the wheels, sum the forces on the body."""
-        c, s = self._cos, self._sin
-        track = yaw_rate * self._half_track_m
-        side = vy + yaw_rate * self.offset_m
-        turning = yaw_rate + self.rate_rad_s
-        swing = turning * self._arm_m + track * c
-        along = vx * c + side * s
-        across = side * c - vx * s + turning * self._lead_m
-        right_x, right_y = _roll_wheel(self.right, along + swing, across - track * s, dt_s)
-        left_x, left_y = _roll_wheel(self.left, along - swing, across + track * s, dt_s)
-        force_roll = right_x + left_x
-        force_lat = right_y + left_y
-        ahead = right_x - left_x
-        self.force_x_n = force_roll * c - force_lat * s
-        self.force_y_n = force_y = force_roll * s + force_lat * c
-        difference_x = ahead * c - (right_y - left_y) * s
-        self.yaw_moment_n_m = self.offset_m * force_y + self._half_track_m * difference_x
-        self._push_n_m = self._lead_m * force_lat + self._arm_m * ahead + self.inertia_kg_m2 * self.rate_rad_s / dt_s
-
-    def hold(self) -> None:
-        """Decide whether the pair turns in this step, and what torque it passes on to the body."""
-        push = self._push_n_m
-        limit = self._holding_n_m
-        if abs(self.heading_rad) >= self._stop_rad and push * self.heading_rad > 0.0:
-            limit = inf
-        self.held = -limit <= push <= limit
-        self.passed_n_m = push if self.held else copysign(limit, push)
-
-    def turn(self, yaw_acceleration: float, dt_s: float) -> None:
-        """Turn the pair for one step unless it is held."""
-        if self.held:
-            self.rate_rad_s = 0.0
-            return
-        rate = ((self._push_n_m - self.passed_n_m) / self.inertia_kg_m2 - yaw_acceleration) * dt_s
-        self.rate_rad_s = rate
-        self.place(self.heading_rad + rate * dt_s)
-
-
-def _roll_wheel(wheel: Wheel, roll_m_s: float, lateral_m_s: float, dt_s: float) -> tuple[float, float]:
-    """Roll one wheel for one step; returns the floor's force on it along and left of its heading [N]."""
-    drive, contact, load = wheel.drive, wheel.contact, wheel.load_n
-    contact.deform(drive.rim_m_s, roll_m_s, lateral_m_s, load, dt_s)
-    force = contact.force_x_n
-    drive.turn(force, load, dt_s)
-    return force, contact.force_y_n
 
 
 class Max2dWorld:
@@ -216,7 +69,7 @@ class Max2dWorld:
         """Wheel pairs by the names of their encoders."""
         self._braked = dict(zip(vehicle.brakes, (self._rear, self._front), strict=True))
         for name, pair in self._braked.items():
-            pair.set_brake(_engaged_without_power(profile.brakes[name]))
+            pair.set_brake(engaged=profile.brakes[name].energise_to_release)
         self._drives = tuple(wheel.drive for wheel in self.wheels.values())
         self._place_body(vehicle, start)
         self._step_s = step_s
@@ -255,8 +108,13 @@ class Max2dWorld:
 
     @property
     def max_slip_ratio(self) -> float:
-        """Largest slip ratio of any wheel since the last ``reset_statistics``."""
+        """Largest slip ratio of any wheel, without sign, since the last ``reset_statistics``."""
         return max(wheel.contact.max_slip_ratio for wheel in self.wheels.values())
+
+    @property
+    def max_slip_angle_rad(self) -> float:
+        """Largest slip angle of any wheel, without sign, since the last ``reset_statistics``."""
+        return max(atan(wheel.contact.max_slip_tangent) for wheel in self.wheels.values())
 
     def heading_rad(self, pair: str) -> float:
         """True heading of a wheel pair by its encoder's name."""
@@ -377,8 +235,3 @@ def _parts_of(profile: Profile) -> tuple[PairedSteerGeometry, SimulationConfig]:
             remedy="add them, or start from a profile that has them: canhelm profile new NAME --extends max2d",
         )
     return profile.vehicle, profile.simulation
-
-
-def _engaged_without_power(brake: BrakeConfig) -> bool:
-    """Whether the brake's spring engages it while nothing energises it."""
-    return brake.energise_to_release
