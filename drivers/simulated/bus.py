@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+import random
 from collections import defaultdict, deque
 from collections.abc import Iterable
 from heapq import heapify, heappop, heappush
@@ -18,6 +19,9 @@ from drivers.bus.contract import ID_MASK, RTR_FLAG, Bus
 from drivers.bus.wire_time import INTERMISSION_BITS, LoadMeter, frame_bits
 
 QUEUE_DEPTH = 64
+
+ERROR_FRAME_BITS = 20 + INTERMISSION_BITS
+"""Error flag and its echo (12 bits), delimiter (8) and intermission (Bosch CAN 2.0 part A, 3.1.3)."""
 
 
 class SimulatedPort(Bus):
@@ -80,15 +84,22 @@ class SimulatedBus:
     Args:
         bit_rate: bit/s.
         name: the interface's name as it stands in logs.
+        seed: of the disturbances.
+        disturbed: share of the frames, 0 to 1, whose last bit a disturbance destroys. Nobody gets such a frame; its
+            sender repeats it after the error frame.
 
     Attributes:
         frames: frames delivered, by identifier with flags.
+        error_frames: frames destroyed.
     """
 
-    def __init__(self, bit_rate: int = 1_000_000, name: str = "vcan0") -> None:
+    def __init__(self, bit_rate: int = 1_000_000, name: str = "vcan0", seed: int = 0, disturbed: float = 0.0) -> None:
         self.bit_rate = bit_rate
         self.name = name
         self.frames: defaultdict[int, int] = defaultdict(int)
+        self.error_frames = 0
+        self._disturbed = disturbed
+        self._random = random.Random(seed)
         self._bit_s = 1.0 / bit_rate
         self._meter = LoadMeter(bit_rate)
         self._ports: list[SimulatedPort] = []
@@ -228,11 +239,22 @@ class SimulatedBus:
         self._delivering = True
         now = max(asyncio.get_running_loop().time(), self._end_s)
         while self._current is not None and self._end_s <= now:
-            self._complete(self._current)
+            if self._disturbed and self._random.random() < self._disturbed:
+                self._repeat(self._current)
+            else:
+                self._complete(self._current)
             self._begin_next(self._free_s)
         self._delivering = False
         if self._current is not None:
             self._arm()
+
+    def _repeat(self, destroyed: _Queued) -> None:
+        """Signal an error and let the frame take part in the next arbitration again."""
+        self.error_frames += 1
+        bits = destroyed[4] - INTERMISSION_BITS + ERROR_FRAME_BITS
+        self._free_s = self._start_s + bits * self._bit_s
+        self._meter.add(self._free_s, bits)
+        heappush(self._queue, destroyed)
 
     def _complete(self, sent: _Queued) -> None:
         _, _, can_id, data, bits, _, sender = sent

@@ -270,6 +270,31 @@ async def test_statistics_tell_load_and_frames_by_identifier() -> None:
     assert bus.queue_high_water == 6
 
 
+async def test_a_destroyed_frame_is_repeated_after_the_error_frame() -> None:
+    bus = SimulatedBus(seed=1, disturbed=0.5)
+    sender, frames = bus.port("master"), listen(bus.port("node"))
+    for number in range(20):
+        sender.send(0x181, bytes([number]))
+    await asyncio.sleep(0.1)
+    assert [data[0] for _, data, _ in frames] == list(range(20))
+    assert bus.error_frames > 0
+    busy = sum(frame_bits(0x181, bytes([number])) for number in range(20)) * BIT_S
+    assert bus.busy_s > busy + bus.error_frames * 70e-6
+
+
+@pytest.mark.parametrize(("seeds", "same"), [((3, 3), True), ((3, 4), False)])
+def test_disturbances_follow_from_the_seed(seeds: tuple[int, int], same: bool) -> None:
+    async def run(seed: int) -> list[Frame]:
+        bus = SimulatedBus(seed=seed, disturbed=0.3)
+        sender, frames = bus.port("master"), listen(bus.port("node"))
+        for number in range(50):
+            sender.send(0x181, bytes([number]))
+        await asyncio.sleep(0.1)
+        return frames
+
+    assert (run_virtual(run(seeds[0])) == run_virtual(run(seeds[1]))) is same
+
+
 TRAFFIC = st.lists(
     st.tuples(st.floats(0.0, 0.002), st.integers(0, 2), st.integers(0, 0x7FF), st.binary(max_size=8)), max_size=40
 )
