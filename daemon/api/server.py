@@ -31,9 +31,15 @@ GROUP = "canhelm"
 class Backend(Protocol):
     """What the server asks of the daemon behind it."""
 
-    robot: str
-    events: list[Callable[[dict[str, Any]], None]]
-    """Callbacks that hear of each event."""
+    @property
+    def robot(self) -> str:
+        """Name of the robot."""
+        ...
+
+    @property
+    def events(self) -> list[Callable[[dict[str, Any]], None]]:
+        """Callbacks that hear of each event; the server adds its own."""
+        ...
 
     @property
     def state(self) -> str:
@@ -140,7 +146,7 @@ class Server:
 
     def status(self) -> dict[str, Any]:
         """The backend's status with the server's own counters."""
-        return {**self.backend.status(), "api": asdict(self.counters)}
+        return {**self.backend.status(), "api": {"pid": os.getpid(), **asdict(self.counters)}}
 
     def _accept(self) -> Connection:
         return Connection(self, crowded=len(self.connections) >= MAX_CLIENTS)

@@ -75,9 +75,9 @@ def build_app() -> App:
     """The command line with all its commands, none of them loaded."""
     app = App(
         name="canhelm",
-        help="Drive robots with maxon EPOS controllers over CAN, and simulate them.",
-        help_epilogue="Example: `canhelm drive turn --rear 10 --front -10 --speed 0.3 --duration 5`\n\n"
-        "Every option can come from the environment: CANHELM_SOCKET, CANHELM_ROBOT, CANHELM_JSON ...",
+        help="Drive robots with maxon EPOS controllers over CAN, and simulate them.\n\n"
+        "Every option can come from the environment: CANHELM_SOCKET, CANHELM_ROBOT, CANHELM_JSON ...\n\n"
+        "Example: `canhelm drive turn --rear -15 --front 15 --speed 0.4 --duration 5`",
         help_format="markdown",
         version=__version__,
         config=OptionEnv("CANHELM_", command=False, show=False),

@@ -18,7 +18,7 @@ PROGRESS_HZ = 5.0
 CLEAR_LINE = "\r\x1b[K"
 
 
-def run_motion(options: Options, method: str, *, no_wait: bool = False, **params: Any) -> int:
+def run_motion(options: Options, method: str, /, *, no_wait: bool = False, **params: Any) -> int:
     """Call a motion's method and print its result.
 
     Args:
@@ -85,5 +85,5 @@ def _draw(method: str, params: dict[str, Any]) -> None:
 
 def progress_text(status: dict[str, Any]) -> str:
     """The state and what the motion reports of itself, in one line."""
-    motion = status.get("motion") or next(iter(status.get("motions") or ()), None)
-    return f"{status.get('state')}  {words(motion, digits=3)}" if motion else str(status.get("state"))
+    motions = "; ".join(words(motion, digits=3) for motion in status.get("motions") or ())
+    return f"{status.get('state')}  {motions}"

@@ -51,7 +51,9 @@ def table(data: Mapping[str, Any]) -> RenderableType:
     from rich.console import Group
 
     parts: list[RenderableType] = [_headline(data), _nodes(data.get("nodes") or ())]
-    parts += [_line(title, data[title]) for title in ("brakes", "vehicle", "motion", "cycle", "bus") if data.get(title)]
+    parts += [
+        _line(title, data[title]) for title in ("brakes", "vehicle", "motions", "cycle", "bus") if data.get(title)
+    ]
     parts += [_event(event) for event in list(data.get("events") or ())[-SHOWN_EVENTS:]]
     return Group(*parts)
 

@@ -1,0 +1,220 @@
+"""``canhelm doctor``: what is wrong with this machine, the daemon, its bus and its drives."""
+
+from __future__ import annotations
+
+import getpass
+import grp
+import json as json_text
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from canhelm import protocol
+from canhelm.client import Client
+from canhelm.errors import CanhelmError
+from daemon.cli.options import DEFAULT, Options
+from daemon.cli.output import show
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+NETWORK_DEVICES = Path("/sys/class/net")
+ARPHRD_CAN = "280"
+IFF_UP = 1
+WANTED_QUEUE = 100
+"""Frames; the kernel's default of 10 is less than one control cycle of a robot sends."""
+LATE_SHARE = 0.001
+OLDEST_PYTHON = (3, 11)
+STYLES = {"ok": "green", "note": "yellow", "problem": "red"}
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that was looked at.
+
+    Attributes:
+        check: what was looked at.
+        verdict: ``problem`` makes the command's exit code 1.
+        finding: what was found.
+        mend: the line that mends it; empty where there is nothing to mend.
+    """
+
+    check: str
+    verdict: Literal["ok", "note", "problem"]
+    finding: str
+    mend: str = ""
+
+
+def doctor(*, options: Options = DEFAULT) -> int:
+    """What is wrong with this machine, the daemon, its bus and its drives, each with the line that mends it.
+
+    Works without a daemon. The exit code is 1 if there is a problem.
+
+    Example: `canhelm doctor`
+    """
+    findings = [*machine_findings(), *interface_findings(NETWORK_DEVICES), *_daemon_findings(options)]
+    rows = [asdict(finding) for finding in findings]
+    show(rows, _table, options.json)
+    return int(any(finding.verdict == "problem" for finding in findings))
+
+
+def _table(rows: list[Mapping[str, str]]) -> Table:
+    from rich.table import Table
+    from rich.text import Text
+
+    grid = Table("check", "verdict", "finding", "what mends it", box=None, header_style="bold", pad_edge=False)
+    for row in rows:
+        verdict = Text(row["verdict"], STYLES[row["verdict"]])
+        grid.add_row(row["check"], verdict, Text(row["finding"]), Text(row["mend"]))
+    return grid
+
+
+# -- this machine -----------------------------------------------------------------------------------------------------
+
+
+def machine_findings() -> Iterator[Finding]:
+    """Python and the group that may use the daemon's socket."""
+    version = ".".join(str(part) for part in sys.version_info[:3])
+    fits = sys.version_info >= OLDEST_PYTHON
+    yield Finding("python", "ok" if fits else "problem", version, "" if fits else "install Python 3.11 or newer")
+    try:
+        members = grp.getgrnam("canhelm")
+    except KeyError:
+        yield Finding(
+            "group", "note", "there is no group canhelm: sockets stay with their user", "sudo groupadd canhelm"
+        )
+        return
+    user = getpass.getuser()
+    if user in members.gr_mem or os.getuid() == 0 or members.gr_gid in os.getgroups():
+        yield Finding("group", "ok", f"{user} may use daemons of the group canhelm")
+    else:
+        yield Finding("group", "note", f"{user} is not in the group canhelm", f"sudo usermod -aG canhelm {user}")
+
+
+def interface_findings(devices: Path) -> Iterator[Finding]:
+    """The CAN interfaces that the kernel lists.
+
+    Args:
+        devices: ``/sys/class/net``.
+    """
+    names = [path.name for path in sorted(devices.glob("*")) if _read(path / "type") == ARPHRD_CAN]
+    if not names:
+        mend = "plug in an adapter, or: sudo modprobe vcan && sudo ip link add vcan0 type vcan"
+        yield Finding("can", "note", "no CAN interface; the simulated bus needs none", mend)
+    for name in names:
+        yield interface_finding(name, devices / name, link_details(name))
+
+
+def interface_finding(name: str, folder: Path, details: Mapping[str, Any]) -> Finding:
+    """One CAN interface: up, not bus-off, and with a queue that holds a cycle's frames.
+
+    Args:
+        name: of the interface.
+        folder: of its attributes.
+        details: as :func:`link_details` gives them.
+    """
+    rate, state = details.get("bitrate"), str(details.get("state", ""))
+    queue = int(_read(folder / "tx_queue_len") or 0)
+    shown = f"{rate} bit/s, {state or 'state unknown'}, queue of {queue}" if rate else f"queue of {queue}"
+    if not int(_read(folder / "flags") or "0", 16) & IFF_UP:
+        virtual = rate is None and name.startswith("vcan")
+        set_up = f"sudo ip link set {name} up" + ("" if virtual else " type can bitrate 1000000 restart-ms 100")
+        return Finding(name, "problem", f"down, {shown}", set_up)
+    if state == "BUS-OFF":
+        mend = f"check cable, termination and bit rate, then: sudo ip link set {name} type can restart"
+        return Finding(name, "problem", shown, mend)
+    if queue < WANTED_QUEUE:
+        return Finding(name, "note", shown, f"sudo ip link set {name} txqueuelen {WANTED_QUEUE}")
+    return Finding(name, "ok", f"up, {shown}")
+
+
+def link_details(name: str) -> dict[str, Any]:
+    """Bit rate and controller state of an interface as ``ip`` tells them; empty where it does not."""
+    tool = shutil.which("ip")
+    if tool is None:
+        return {}
+    command = [tool, "-json", "-details", "link", "show", name]
+    try:
+        told = subprocess.run(command, capture_output=True, text=True, timeout=5.0, check=False)
+        data = json_text.loads(told.stdout)[0]["linkinfo"]["info_data"]
+        return {"bitrate": data.get("bittiming", {}).get("bitrate"), "state": data.get("state")}
+    except (OSError, subprocess.TimeoutExpired, ValueError, LookupError, TypeError, AttributeError):
+        return {}
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text().strip()
+    except OSError:
+        return ""
+
+
+# -- the daemon -------------------------------------------------------------------------------------------------------
+
+
+def _daemon_findings(options: Options) -> Iterator[Finding]:
+    chosen = options.socket or options.robot
+    live = protocol.find_sockets()
+    if not chosen and not live:
+        start = "canhelm run --simulate --profile max2d, or: systemctl start canhelm"
+        yield Finding("daemon", "note", "no daemon is running", start)
+        return
+    for path in [None] if chosen else live:
+        try:
+            with Client(path or options.socket, options.robot) as client:
+                yield Finding("daemon", "ok", f"answers on {client.path}")
+                yield from status_findings(client.status())
+        except CanhelmError as error:
+            yield Finding("daemon", "problem", error.message, error.remedy or "")
+
+
+def status_findings(status: Mapping[str, Any]) -> Iterator[Finding]:
+    """What a daemon's status tells of trouble."""
+    state = str(status.get("state"))
+    stopped = state in ("fault", "estop")
+    sentence = f"{state}: {status['message']}" if status.get("message") else state
+    yield Finding("vehicle", "problem" if stopped else "ok", sentence, "canhelm reset" if stopped else "")
+    for node in status.get("nodes") or ():
+        yield _node_finding(node)
+    api = status.get("api") or {}
+    yield _cycle_finding(status.get("cycle") or {}, api.get("pid"))
+    yield _bus_finding(status.get("bus") or {})
+    defects = api.get("internal_errors", 0)
+    if defects:
+        yield Finding(
+            "api", "problem", f"{defects} requests failed inside the daemon", "report it with the daemon's log"
+        )
+
+
+def _node_finding(node: Mapping[str, Any]) -> Finding:
+    name = f"node {node.get('node')} ({node.get('name')})"
+    fault = node.get("fault")
+    if isinstance(fault, Mapping):
+        return Finding(name, "problem", str(fault.get("message")), str(fault.get("remedy") or "canhelm reset"))
+    if fault:
+        return Finding(name, "problem", str(fault), "canhelm reset")
+    if node.get("node_state") != "ready":
+        told = str(node.get("status") or node.get("node_state"))
+        return Finding(name, "problem", told, "switch motor power on, and check the cable and the node id")
+    return Finding(name, "ok", f"{node.get('node_state')}, {node.get('state', 'reading')}")
+
+
+def _cycle_finding(cycle: Mapping[str, Any], pid: int | None) -> Finding:
+    cycles, late = cycle.get("cycles", 0), cycle.get("late_cycles", 0)
+    found = f"{late} of {cycles} control cycles were late"
+    if late > LATE_SHARE * cycles:
+        return Finding("cycle", "problem", found, f"give it a real-time priority: sudo chrt -f -p 50 {pid}")
+    return Finding("cycle", "ok", found)
+
+
+def _bus_finding(bus: Mapping[str, Any]) -> Finding:
+    lost = {key: value for key, value in bus.items() if "drop" in key and isinstance(value, int) and value}
+    if lost:
+        told = ", ".join(f"{key} {value}" for key, value in lost.items())
+        return Finding("bus", "problem", told, "lower the load, or look for a node that does not acknowledge")
+    return Finding("bus", "ok", f"load {float(bus.get('load') or 0.0):.1%}, nothing dropped")
