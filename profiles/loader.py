@@ -67,7 +67,7 @@ def load(name_or_path: str | Path, search: Sequence[Path] = SEARCH) -> LoadedPro
     tree = Assembly(mistakes).robot(path)
     profile, warnings = _checked(tree, mistakes)
     if mistakes or profile is None:
-        raise ProfileError(str(name_or_path), _without_repeats(mistakes))
+        raise ProfileError(str(name_or_path), _in_order(mistakes, path))
     values = leaves(tree) if tree is not None else []
     origin = {field: str(value.place) for field, value in values}
     assumed = {field: str(value.place) for field, value in values if value.assumed}
@@ -185,6 +185,7 @@ def _checked(tree: Node | None, mistakes: list[Mistake]) -> tuple[Profile | None
     return None if mistakes else msgspec.convert(data, Profile), warnings
 
 
-def _without_repeats(mistakes: list[Mistake]) -> list[Mistake]:
-    """One mistake in a file that four drives extend is one mistake."""
-    return list({(mistake.place, mistake.what): mistake for mistake in reversed(mistakes)}.values())[::-1]
+def _in_order(mistakes: list[Mistake], path: Path) -> list[Mistake]:
+    """By file and line, the robot's own file first; one mistake in a file that four drives extend is one mistake."""
+    unique = {(mistake.place, mistake.what): mistake for mistake in reversed(mistakes)}.values()
+    return sorted(unique, key=lambda found: (found.place.file != str(path), found.place.file, found.place.line))

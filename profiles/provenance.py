@@ -204,7 +204,7 @@ class Reader:
             return None
         except yaml.reader.ReaderError as error:
             line = text[: error.position].count("\n") + 1
-            self._wrong(line, f"character U+{ord(error.character):04X} is not allowed", "remove it")
+            self._wrong(line, f"character U+{ord(text[error.position]):04X} is not allowed", "remove it")
             return None
         if root is None:
             self._wrong(1, "is empty", "write a profile, or extends: max2d to begin with a shipped one")

@@ -1,0 +1,67 @@
+"""Whether the parts of a profile fit together."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from canhelm.errors import ConfigError
+from profiles.loader import load
+from vcan_tests.profiles.conftest import Mistakes, Robot
+
+
+@pytest.mark.parametrize(
+    ("yaml", "mistake"),
+    [
+        ("drives: {front_left: {node: 2}}", "drives.front_left.node: node id 2 is taken by drives.rear_left.node ("),
+        ("encoders: {rear: {node: 1}}", "encoders.rear.node: node id 1 is taken by drives.rear_right.node ("),
+        (
+            "vehicle: {wheels: [rear_right, rear_left, front_left, middle]}",
+            "vehicle.wheels[3]: drives has no 'middle'; use one of: rear_right, rear_left, front_left, front_right",
+        ),
+        (
+            "vehicle: {wheels: [rear_right, rear_left, front_left, rear_left]}",
+            "vehicle.wheels[3]: 'rear_left' stands here twice; name each of drives once",
+        ),
+        ("vehicle: {encoders: [rear, bow]}", "vehicle.encoders[1]: encoders has no 'bow'; use one of: rear, front"),
+        ("vehicle: {brakes: [stern, front]}", "vehicle.brakes[0]: brakes has no 'stern'; use one of: rear, front"),
+        ("brakes: {rear: {drive: middle}}", "brakes.rear.drive: drives has no 'middle'; use one of: rear_right"),
+        ("brakes: {rear: {output: 3}}", "brakes.rear.output_bit: bit 12 does not drive output 3; write output_bit: 13"),
+        (
+            "brakes: {rear: {output_bit: 15}}",
+            "brakes.rear.output_bit: bit 15 does not drive output 4; write output_bit: 12",
+        ),
+        ("brakes: {rear: {drive: front_left}}", "brakes.front: output 4 of front_left already switches brakes.rear ("),
+        (
+            "encoders: {rear: {total_counts: 4000}}",
+            "encoders.rear.total_counts: is 4000, less than one turn; write 4096",
+        ),
+        (
+            "encoders: {rear: {zero_counts: 4096}}",
+            "encoders.rear.zero_counts: is 4096, outside the range; write 0 to 4095",
+        ),
+    ],
+)
+def test_parts_that_do_not_fit_are_a_mistake(mistakes: Mistakes, yaml: str, mistake: str) -> None:
+    assert [found for found in mistakes(yaml) if f": {mistake}" in found]
+
+
+@pytest.mark.parametrize(("version", "remedy"), [(0, "write schema_version: 1"), (2, "install a newer canhelm")])
+def test_another_schema_version_is_a_mistake(tmp_path: Path, version: int, remedy: str) -> None:
+    (tmp_path / "lab.yaml").write_text(f"extends: max2d\nschema_version: {version}\n")
+    with pytest.raises(ConfigError, match=rf"lab\.yaml:2: schema_version: is {version}, .*; {remedy}"):
+        load(tmp_path / "lab.yaml")
+
+
+def test_two_brakes_on_two_outputs_of_one_drive_fit(robot: Robot) -> None:
+    loaded = robot("brakes: {rear: {drive: front_left, output: 3, output_bit: 13}}")
+    assert loaded.profile.brakes["rear"].output == 3
+
+
+def test_a_weak_output_for_a_brake_is_a_warning(robot: Robot) -> None:
+    assert "carries 100 mA only" in robot("brakes: {rear: {output: 3, output_bit: 13}}").warnings[0]
+
+
+def test_the_second_place_of_a_double_node_id_is_named_with_file_and_line(mistakes: Mistakes) -> None:
+    assert "taken by drives.rear_right.node (" in mistakes("encoders: {front: {node: 1}}")[0]
