@@ -14,12 +14,12 @@ of mass.
 
 from __future__ import annotations
 
-from math import atan, cos, sin
+from math import atan, cos, hypot, sin
 from random import Random
 
 from canhelm.errors import ConfigError
 from drivers.simulated.motor import WheelDrive
-from drivers.simulated.tyre import Contact
+from drivers.simulated.tyre import DAMPING_S, Contact
 from drivers.simulated.wheel_pair import Pair, Wheel
 from drivers.simulated.world import STEP_S, Axis
 from profiles.schema import PairedSteerGeometry, Profile, SimulationConfig
@@ -43,7 +43,8 @@ class Max2dWorld:
         step_s: integration step.
 
     Raises:
-        ConfigError: the profile has no paired-steer vehicle or no simulation section.
+        ConfigError: the profile has no paired-steer vehicle or no simulation section, its tyres are too stiff for the
+            step, or the robot would tip over before it slides.
     """
 
     def __init__(
@@ -54,6 +55,8 @@ class Max2dWorld:
         step_s: float = STEP_S,
     ) -> None:
         vehicle, simulation = _parts_of(profile)
+        _check_stiffness(profile, vehicle, simulation, step_s)
+        _check_tipping(vehicle, simulation)
         random = Random(seed)
         load = vehicle.mass_kg * GRAVITY_M_S2 / 4.0
         self.wheels = {
@@ -235,3 +238,52 @@ def _parts_of(profile: Profile) -> tuple[PairedSteerGeometry, SimulationConfig]:
             remedy="add them, or start from a profile that has them: canhelm profile new NAME --extends max2d",
         )
     return profile.vehicle, profile.simulation
+
+
+def _rim_mobility(profile: Profile, vehicle: PairedSteerGeometry, simulation: SimulationConfig) -> float:
+    """Acceleration at a rim per force [1/kg]: of the lightest wheel, the pair about its axes, the body on four tyres."""
+    wheels = (profile.drives[name] for name in vehicle.wheels)
+    lightest = min(
+        (simulation.wheel_inertia_kg_m2 + drive.total_ratio**2 * drive.motor.rotor_inertia_kg_m2)
+        / drive.wheel_radius_m**2
+        for drive in wheels
+    )
+    pair = 2.0 * vehicle.contact_offset_m**2 / simulation.steering_inertia_kg_m2
+    return 1.0 / lightest + pair + 4.0 / vehicle.mass_kg
+
+
+def _check_stiffness(
+    profile: Profile, vehicle: PairedSteerGeometry, simulation: SimulationConfig, step_s: float
+) -> None:
+    """Refuse tyres that the step cannot follow.
+
+    A mass 1/M on a spring k with the damping tau k, integrated as here in steps h, is stable for
+    ``k M h (h + 2 tau) < 4``; 3 leaves room for the shift of load.
+    """
+    mobility = _rim_mobility(profile, vehicle, simulation)
+    stiffest = 3.0 / (mobility * step_s * (step_s + 2.0 * DAMPING_S))
+    tyre = simulation.tyre
+    load = vehicle.mass_kg * GRAVITY_M_S2 / 4.0
+    least = tyre.cornering_stiffness_per_rad * load / stiffest
+    if tyre.relaxation_length_m < least:
+        raise ConfigError(
+            f"the simulated tyres are too stiff for steps of {1000.0 * step_s:g} ms",
+            object="simulation.tyre.relaxation_length_m",
+            value=tyre.relaxation_length_m,
+            limit=least,
+            remedy=f"set a relaxation length of at least {least:.4f} m, or a smaller cornering stiffness",
+        )
+
+
+def _check_tipping(vehicle: PairedSteerGeometry, simulation: SimulationConfig) -> None:
+    """Refuse a centre of mass so high that full friction would lift a wheel."""
+    width = vehicle.pivot_track_m + 2.0 * vehicle.contact_offset_m
+    highest = 0.5 / (simulation.tyre.friction * hypot(1.0 / vehicle.wheelbase_m, 1.0 / width))
+    if vehicle.centre_of_mass_height_m > highest:
+        raise ConfigError(
+            "the simulated robot would lift a wheel before it slides, which the simulation cannot do",
+            object="vehicle.centre_of_mass_height_m",
+            value=vehicle.centre_of_mass_height_m,
+            limit=highest,
+            remedy=f"set at most {highest:.3f} m, or less tyre friction",
+        )

@@ -29,8 +29,8 @@ def simulation() -> SimulationConfig:
     return PROFILE.simulation
 
 
-def with_friction(friction: float) -> Profile:
-    tyre = msgspec.structs.replace(simulation().tyre, friction=friction)
+def with_tyre(**values: float) -> Profile:
+    tyre = msgspec.structs.replace(simulation().tyre, **values)
     return msgspec.structs.replace(PROFILE, simulation=msgspec.structs.replace(simulation(), tyre=tyre))
 
 
@@ -136,6 +136,29 @@ def test_a_profile_without_a_vehicle_is_refused() -> None:
         Max2dWorld(msgspec.structs.replace(PROFILE, vehicle=None))
 
 
+def test_tyres_too_stiff_for_the_step_are_refused_with_the_shortest_relaxation_length() -> None:
+    with pytest.raises(ConfigError, match="too stiff") as refusal:
+        Max2dWorld(with_tyre(relaxation_length_m=0.001))
+    assert isinstance(refusal.value.limit, float)
+    Max2dWorld(with_tyre(relaxation_length_m=refusal.value.limit))
+
+
+def test_the_stiffest_accepted_tyre_still_comes_to_rest() -> None:
+    with pytest.raises(ConfigError) as refusal:
+        Max2dWorld(with_tyre(relaxation_length_m=0.001))
+    robot = Robot(with_tyre(relaxation_length_m=refusal.value.limit), headings=(-0.2, 0.3))
+    robot.speed_up(0.5, 0.3, 0.35, 0.55)
+    robot.roll(*[0.0] * 4, for_s=1.0)
+    robot.power_off()
+    robot.roll(*[0.0] * 4, for_s=4.0)
+    assert not robot.world.moving
+
+
+def test_a_robot_that_would_tip_over_is_refused() -> None:
+    with pytest.raises(ConfigError, match="lift a wheel"):
+        Max2dWorld(with_tyre(friction=1.5))
+
+
 @pytest.mark.parametrize("heading", [0.0, radians(60), radians(-85)])
 def test_a_straight_drive_goes_straight(heading: float) -> None:
     robot = Robot(headings=(heading, heading))
@@ -158,7 +181,7 @@ def test_the_commanded_speed_is_reached_within_the_slip_of_rolling() -> None:
 @pytest.mark.parametrize("friction", [0.4, 0.7, 1.0])
 def test_figure_4_16_is_driven_on_a_slightly_wider_circle(friction: float) -> None:
     radius, speeds = turning_speeds(rear=0.15, front=-0.3, speed_m_s=1.0)
-    robot = Robot(with_friction(friction), headings=(0.15, -0.3))
+    robot = Robot(with_tyre(friction=friction), headings=(0.15, -0.3))
     robot.speed_up(*speeds, within_s=1.5)
     robot.roll(*speeds, for_s=2.0)
     assert 1.02 < robot.driven_radius() / radius < 1.045
@@ -171,7 +194,7 @@ def test_figure_4_15_is_driven_on_a_wider_circle(friction: float) -> None:
         for case in json.loads(VECTORS.read_text())["cases"]
         if case["input"] == {"alpha12": -0.35, "alpha34": -0.35, "v": 0.5}
     )
-    robot = Robot(with_friction(friction), headings=(-0.35, 0.35))
+    robot = Robot(with_tyre(friction=friction), headings=(-0.35, 0.35))
     robot.speed_up(*case["wheel_speed"])
     robot.roll(*case["wheel_speed"], for_s=2.0)
     assert 1.045 < robot.driven_radius() / case["R_center"] < 1.08
