@@ -1,0 +1,48 @@
+"""The text of candump's log files: ``(1607120998.528012) vcan0 181#3706``, one frame a line, ``R`` for a remote frame.
+
+It is what ``candump -L`` writes and what ``canplayer`` and python-can read (can-utils, lib.c, format of log files).
+"""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+from drivers.bus.contract import ID_MASK, RTR_FLAG
+
+_LINE = re.compile(
+    r"\((\d+\.\d+)\) (\S+) ([0-7][0-9A-Fa-f]{2})#(?:[Rr][0-8]?|((?:[0-9A-Fa-f]{2}){0,8}))(?: [RT])?\s*", re.ASCII
+)
+
+
+class LogFrame(NamedTuple):
+    """One line of a log.
+
+    Attributes:
+        timestamp_s: seconds since the log's epoch.
+        interface: name of the interface.
+        can_id: 11-bit identifier, with RTR_FLAG for a remote frame.
+        data: 0 to 8 bytes, empty for a remote frame.
+    """
+
+    timestamp_s: float
+    interface: str
+    can_id: int
+    data: bytes
+
+
+def make_line(timestamp_s: float, interface: str, can_id: int, data: bytes) -> str:
+    """One line without its line end; the time in full microseconds."""
+    payload = "R" if can_id & RTR_FLAG else data.hex().upper()
+    return f"({timestamp_s:017.6f}) {interface} {can_id & ID_MASK:03X}#{payload}"
+
+
+def parse_line(line: str) -> LogFrame | None:
+    """The frame of one line; None for anything but a classic base frame (extended, FD and error frames too)."""
+    match = _LINE.fullmatch(line)
+    if match is None:
+        return None
+    time_text, interface, number, data = match.groups()
+    if data is None:
+        return LogFrame(float(time_text), interface, int(number, 16) | RTR_FLAG, b"")
+    return LogFrame(float(time_text), interface, int(number, 16), bytes.fromhex(data))
