@@ -72,6 +72,8 @@ class Device(Protocol):
     status_sentence: str
     """What the master is doing about the node, or what is wrong with it, for people."""
     fault: Fault | None
+    reading_time_s: float
+    """Loop time of the last reading; ``-inf`` before the first."""
 
     def status(self) -> dict[str, Any]:
         """Everything about the device for ``canhelm status``; keys carry units."""
@@ -91,8 +93,6 @@ class Drive(Device, Protocol):
     speed_m_s: float
     current_a: float
     target_speed_m_s: float
-    reading_time_s: float
-    """Loop time of the last reading; ``-inf`` before the first."""
 
     def command_speed(self, speed_m_s: float) -> None:
         """Take a target speed at the rim for the next ``transmit``."""
@@ -152,7 +152,6 @@ class SteeringEncoder(Device, Protocol):
     """The heading of one wheel pair."""
 
     heading_rad: float
-    reading_time_s: float
 
     async def preset_zero(self) -> int:
         """Make the present position heading 0 by the device's preset; returns the old position value in counts."""

@@ -1,0 +1,121 @@
+"""The daemon put together: the one place that knows every room."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import signal
+from pathlib import Path
+
+from daemon.api.server import Server
+from daemon.runtime.clock import VirtualTimeLoop
+from daemon.runtime.commands import Commands
+from daemon.runtime.cycle import Cycle
+from daemon.runtime.recorder import CandumpRecorder
+from daemon.runtime.service import Service
+from daemon.runtime.supervisor import Supervisor
+from daemon.runtime.vehicles import make_vehicle
+from drivers.bus.contract import Bus
+from drivers.bus.python_can import open_bus
+from drivers.canopen.master import Master
+from drivers.devices import Devices
+from drivers.simulated.bus import SimulatedBus
+from drivers.simulated.network import SimulatedNetwork
+from profiles.schema import Profile
+
+LOGGER = logging.getLogger("canhelm")
+
+
+class App:
+    """One robot's daemon: bus, master, devices, supervisor, cycle, recorder and server.
+
+    Args:
+        profile: the robot.
+        bus: ``simulated``, or ``INTERFACE:CHANNEL`` of python-can.
+        socket: path of the API's socket; None for a daemon without one (demo, tests).
+        record: folder or file for a candump log; None for none.
+        seed: of everything random in the simulated network.
+        powered: whether the simulated nodes have power from the start.
+
+    Raises:
+        BusOff: from :meth:`start`, where the interface is missing or down.
+    """
+
+    def __init__(
+        self,
+        profile: Profile,
+        bus: str = "simulated",
+        *,
+        socket: Path | None = None,
+        record: Path | None = None,
+        seed: int = 0,
+        powered: bool = True,
+    ) -> None:
+        self.profile = profile
+        self.network: SimulatedNetwork | None = None
+        self.medium: SimulatedBus | None = None
+        self._powered = powered
+        self._record = record
+        self.recorder: CandumpRecorder | None = None
+        self.bus = self._simulated_bus(seed) if bus == "simulated" else open_bus(bus, profile.network.bit_rate)
+        self.master = Master(self.bus, profile.network)
+        self.devices = Devices(self.master, profile)
+        self.vehicle = make_vehicle(profile, self.devices)
+        period_s = 1.0 / profile.network.cycle_hz
+        self.supervisor = Supervisor(self.master, self.devices, self.vehicle, period_s)
+        self.cycle = Cycle(self.master, self.devices, period_s, self.supervisor.step)
+        commands = Commands(self.supervisor, self._switch_power if self.network else None)
+        self.service = Service(profile.name, self.supervisor, commands, self.bus, self.cycle)
+        self.server = Server(self.service, socket) if socket else None
+
+    def _simulated_bus(self, seed: int) -> Bus:
+        self.medium = SimulatedBus(bit_rate=self.profile.network.bit_rate, name="vcan0")
+        self.network = SimulatedNetwork(self.profile, self.medium, seed)
+        return self.medium.port("master")
+
+    def _switch_power(self, node: int | str, on: bool) -> None:
+        assert self.network is not None
+        if on:
+            self.network.power_on(node)
+        else:
+            self.network.power_off(node)
+
+    async def start(self) -> None:
+        """Open the socket first, then the bus; everything else comes up by itself. Raises BusOff."""
+        if self.server is not None:
+            await self.server.start()
+        if self._record is not None:
+            virtual = isinstance(asyncio.get_running_loop(), VirtualTimeLoop)
+            self.recorder = CandumpRecorder(self.bus, self._record, self.profile.name, virtual=virtual)
+            self.recorder.start()
+        if self.network is not None and self._powered:
+            self.network.power_on("all")
+        await self.master.start()
+        self.devices.start()
+        self.cycle.start()
+
+    async def close(self) -> None:
+        """Bring the vehicle to rest, then take everything down."""
+        await self.supervisor.close()
+        self.cycle.stop()
+        await self.devices.close()
+        await self.master.close()
+        if self.network is not None:
+            await self.network.close()
+        if self.server is not None:
+            await self.server.close()
+        if self.recorder is not None:
+            self.recorder.close()
+
+    async def run(self) -> None:
+        """Run until SIGTERM or SIGINT, then go down in order; a second signal does not cut that short."""
+        loop = asyncio.get_running_loop()
+        ended = asyncio.Event()
+        for number in (signal.SIGTERM, signal.SIGINT):
+            loop.add_signal_handler(number, ended.set)
+        try:
+            await self.start()
+            await ended.wait()
+            LOGGER.info("going down: stopping the vehicle")
+        finally:
+            await self.close()

@@ -1,0 +1,114 @@
+"""``canhelm demo``: the published manoeuvres on a simulated network, in one process."""
+
+from __future__ import annotations
+
+import asyncio
+import importlib.util
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from canhelm.errors import UsageError
+from daemon.cli.output import Json, say, show
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from daemon.demo import FigureResult
+
+
+def demo(
+    *,
+    figure: str | None = None,
+    virtual_time: Annotated[bool, Parameter(negative=())] = False,
+    seed: int = 0,
+    out: Path | None = None,
+    profile: str = "max2d",
+    json: Json = None,
+) -> int:
+    """Boot a simulated MAX2D and drive the manoeuvres that its designers published.
+
+    Example: `canhelm demo --virtual-time --out demo-out`
+
+    Args:
+        figure: One figure (4.6, 4.7, 4.15 or 4.16); all of them without it.
+        virtual_time: As fast as the processor goes instead of in real time; the same run every time.
+        seed: Seed of everything random in the simulated network.
+        out: Folder for pictures and the candump log.
+        profile: A robot with paired steering and simulation data.
+    """
+    from daemon.demo import FIGURES, Demo
+    from daemon.runtime.clock import run_virtual
+    from profiles.loader import load
+
+    figures = tuple(entry for entry in FIGURES if figure in (None, entry.identity))
+    if not figures:
+        have = ", ".join(entry.identity for entry in FIGURES)
+        raise UsageError(f"no figure {figure!r}", remedy=f"one of {have}")
+    robot = load(profile).profile
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+    with _teller() as tell:
+
+        async def drive() -> list[FigureResult]:
+            return await Demo(robot, seed, out, tell).run(figures)
+
+        results = run_virtual(drive()) if virtual_time else asyncio.run(drive())
+    show([result.numbers for result in results], lambda _: _table(results), json)
+    if out is not None:
+        _draw(results, robot.vehicle, out)
+    return 0
+
+
+class _teller:
+    """A live line on a terminal, plain sentences elsewhere; on stderr."""
+
+    def __enter__(self) -> Callable[[str], None]:
+        self._status: Any = None
+        if sys.stderr.isatty():
+            from daemon.cli.output import console
+
+            self._status = console(stderr=True).status("starting")
+            self._status.__enter__()
+            return self._tell
+        return say
+
+    def _tell(self, sentence: str) -> None:
+        self._status.console.print(f"· {sentence}")
+        self._status.update(sentence)
+
+    def __exit__(self, *error: object) -> None:
+        if self._status is not None:
+            self._status.__exit__(*error)
+
+
+def _table(results: list[FigureResult]) -> Table:
+    from rich.table import Table
+
+    table = Table("figure", "move", "quantity", "published", "commanded", "achieved", title="MAX2D, simulated")
+    for result in results:
+        numbers = result.numbers
+        keys = ("radius_m",) if result.figure.move == "turn" else ("end_x_m", "end_y_m")
+        for key in keys:
+            cells = [numbers[column].get(key) for column in ("published", "commanded", "achieved")]
+            shown = ["-" if cell is None else f"{cell:.3f}" for cell in cells]
+            table.add_row(result.figure.identity, result.figure.move, key, *shown)
+        achieved = numbers["achieved"]
+        table.add_row("", "", "steering error, deg", "-", "0", f"{achieved['steering_error_deg']:.2f}")
+        table.add_row("", "", "slip ratio | slip angle, deg", "-", "-",
+                      f"{achieved['max_slip_ratio']:.3f} | {achieved['max_slip_angle_deg']:.2f}")  # fmt: skip
+        table.add_section()
+    return table
+
+
+def _draw(results: list[FigureResult], geometry: Any, out: Path) -> None:
+    if importlib.util.find_spec("matplotlib") is None:
+        say("no pictures: matplotlib is missing - pip install 'canhelm[plot]'")
+        return
+    from daemon.demo_pictures import draw
+
+    for result in results:
+        say(f"picture {draw(result, geometry, out)}")

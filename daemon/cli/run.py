@@ -1,0 +1,76 @@
+"""``canhelm run``: the daemon in the foreground."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from canhelm import protocol
+from canhelm.errors import UsageError
+from daemon.cli.output import say
+
+
+def run(
+    *,
+    profile: str | None = None,
+    bus: str | None = None,
+    simulate: Annotated[bool, Parameter(negative=())] = False,
+    virtual_time: Annotated[bool, Parameter(negative=())] = False,
+    seed: int = 0,
+    socket: Path | None = None,
+    record: Path | None = None,
+    unpowered: Annotated[bool, Parameter(negative=())] = False,
+) -> int:
+    """Run a robot's daemon in the foreground until Ctrl-C or SIGTERM; then it stops the vehicle and goes down.
+
+    Example: `canhelm run --simulate --profile max2d`
+
+    Args:
+        profile: Name of a profile, or a YAML file.
+        bus: `socketcan:can0` or another INTERFACE:CHANNEL of python-can; `simulated`.
+        simulate: Simulate the network of the profile in this process; the same as `--bus simulated`.
+        virtual_time: Refused here: clients live in real time. `canhelm demo --virtual-time` has it.
+        seed: Seed of everything random in the simulated network.
+        socket: Where to listen; the default is the robot's socket in the runtime folder.
+        record: Folder or file for a candump log.
+        unpowered: Simulated drives have no power until `canhelm sim power all on`.
+    """
+    from daemon.app import App
+    from profiles.loader import load
+
+    chosen = _bus(bus, simulate=simulate)
+    if profile is None:
+        raise UsageError(
+            "which robot?", remedy="give --profile NAME or FILE; `canhelm profile list` shows the shipped ones"
+        )
+    if virtual_time:
+        raise UsageError(
+            "virtual time is for demos, campaigns and tests: clients of a socket live in real time",
+            remedy="leave --virtual-time out, or use `canhelm demo --virtual-time`",
+        )
+    loaded = load(profile)
+    path = socket or Path(protocol.default_socket(loaded.profile.name))
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s %(message)s")
+    logging.getLogger("canhelm").info("robot %s on %s, socket %s", loaded.profile.name, chosen, path)
+
+    async def serve() -> None:
+        app = App(loaded.profile, chosen, socket=path, record=record, seed=seed, powered=not unpowered)
+        await app.run()
+
+    asyncio.run(serve())
+    say("the vehicle is at rest and its drives are off")
+    return 0
+
+
+def _bus(bus: str | None, *, simulate: bool) -> str:
+    if simulate and bus not in (None, "simulated"):
+        raise UsageError(f"--simulate and --bus {bus} contradict each other", remedy="give one of them")
+    if simulate or bus == "simulated":
+        return "simulated"
+    if bus is None:
+        raise UsageError("which bus?", remedy="give --simulate, or --bus socketcan:can0")
+    return bus

@@ -1,0 +1,262 @@
+"""The demo: a simulated MAX2D boots, steers its wheel pairs and drives the manoeuvres that its designers published.
+
+Everything is real but the network: the daemon of ``daemon.app`` with its master, drivers, loops and gate drives
+simulated nodes over the simulated bus. What was achieved is read from the simulation's truth, not from odometry.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from canhelm.errors import Timeout, UsageError
+from daemon.app import App
+from daemon.loops.geometry import solve_turning
+from daemon.runtime.supervisor import VehicleState
+from profiles.schema import PairedSteerGeometry, Profile
+
+BOOT_DEADLINE_S = 20.0
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One published manoeuvre (MAX2D thesis, chapter 4).
+
+    Attributes:
+        identity: number of the figure.
+        move: ``parallel`` or ``turn``.
+        rear_deg, front_deg: headings of the pairs (alpha_12 and minus alpha_34 of the thesis).
+        speed_m_s: of the robot's centre.
+        duration_s: of the published simulation.
+        published: what the thesis prints or its program computes.
+    """
+
+    identity: str
+    move: str
+    rear_deg: float
+    front_deg: float
+    speed_m_s: float
+    duration_s: float
+    published: dict[str, float]
+
+    def request(self) -> tuple[str, dict[str, Any]]:
+        """Method and parameters that drive it."""
+        common = {"speed_m_s": self.speed_m_s, "duration_s": self.duration_s}
+        if self.move == "parallel":
+            return "drive.parallel", {"angle_deg": self.rear_deg, **common}
+        return "drive.turn", {"rear_deg": self.rear_deg, "front_deg": self.front_deg, **common}
+
+
+FIGURES = (
+    Figure("4.6", "parallel", 0.0, 0.0, -1.0, 4.0, {"end_x_m": -4.0, "end_y_m": 0.0}),
+    Figure("4.7", "parallel", 60.0, 60.0, 0.5, 4.0, {"end_x_m": 1.0, "end_y_m": 1.732}),
+    Figure("4.15", "turn", math.degrees(-0.35), math.degrees(0.35), 0.5, 4.0, {"radius_m": 0.6699}),
+    Figure("4.16", "turn", math.degrees(0.15), math.degrees(-0.3), 1.0, 4.0, {"radius_m": 1.0275}),
+)
+
+
+@dataclass(slots=True)
+class Track:
+    """What happened in one figure, a row a control cycle (SI, radians; robot's start is the origin).
+
+    Attributes:
+        time_s: since the figure's begin.
+        pose: x, y and yaw of the robot's centre, from the simulation.
+        heading_rad: rear and front heading, from the encoders.
+        commanded_m_s, measured_m_s: speed of each wheel.
+        slip_angle_rad: of each wheel, from the simulation.
+    """
+
+    time_s: list[float] = field(default_factory=list)
+    pose: list[tuple[float, float, float]] = field(default_factory=list)
+    heading_rad: list[tuple[float, ...]] = field(default_factory=list)
+    commanded_m_s: list[tuple[float, ...]] = field(default_factory=list)
+    measured_m_s: list[tuple[float, ...]] = field(default_factory=list)
+    slip_angle_rad: list[tuple[float, ...]] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class FigureResult:
+    """One driven figure: the numbers of ``--json``, and the track for pictures."""
+
+    figure: Figure
+    numbers: dict[str, Any]
+    track: Track
+    icr_m: tuple[float, float] | None
+
+
+class Demo:
+    """Boots one simulated robot and drives figures with it.
+
+    Args:
+        profile: a robot with paired steering and simulation data.
+        seed: of everything random in the simulated network.
+        record: folder for the candump log, or None.
+        tell: called with a sentence at each step of the demo.
+    """
+
+    def __init__(self, profile: Profile, seed: int, record: Path | None, tell: Callable[[str], None]) -> None:
+        if not isinstance(profile.vehicle, PairedSteerGeometry):
+            raise UsageError(f"profile {profile.name} has no paired steering", remedy="the demo drives max2d")
+        self.app = App(profile, seed=seed, record=record)
+        self._geometry = profile.vehicle
+        self._tell = tell
+
+    async def run(self, figures: tuple[Figure, ...]) -> list[FigureResult]:
+        """Boot, drive the figures one after another, go down. Raises CanhelmError leaves where the robot fails."""
+        await self.app.start()
+        try:
+            await self._boot()
+            return [await self._drive(figure) for figure in figures]
+        finally:
+            await self.app.close()
+
+    async def _boot(self) -> None:
+        self._tell("booting: four drives and two encoders on a simulated CANopen bus")
+        loop = asyncio.get_running_loop()
+        begin_s, ready = loop.time(), loop.create_future()
+
+        def look() -> None:
+            if self.app.supervisor.state is VehicleState.IDLE and not ready.done():
+                ready.set_result(None)
+
+        self.app.supervisor.observers.append(look)
+        try:
+            await asyncio.wait_for(ready, BOOT_DEADLINE_S)
+        except TimeoutError:
+            raise Timeout(f"the simulated robot did not boot: {self.app.supervisor.message}") from None
+        finally:
+            self.app.supervisor.observers.remove(look)
+        self._tell(f"ready after {loop.time() - begin_s:.2f} s")
+
+    async def _drive(self, figure: Figure) -> FigureResult:
+        app = self.app
+        assert app.network is not None
+        world = app.network.world
+        loop = asyncio.get_running_loop()
+        begin_s, track = loop.time(), Track()
+        before = self._counts()
+        world.advance(begin_s)
+        world.reset_statistics()
+        origin = world.pose
+        observer = self._observer(track, begin_s, origin)
+        app.supervisor.observers.append(observer)
+        method, parameters = figure.request()
+        lease = app.service.open_lease("demo")
+        renewing = loop.create_task(self._renew(lease))
+        self._tell(f"figure {figure.identity}: {method} {parameters}")
+        try:
+            result = await app.service.call(method, parameters, lease)
+        finally:
+            app.supervisor.observers.remove(observer)
+            renewing.cancel()
+            app.service.close_lease(lease)
+        frames, cycles, late, busy_s = (now - then for now, then in zip(self._counts(), before, strict=True))
+        duration_s = loop.time() - begin_s
+        numbers = {
+            "figure": figure.identity,
+            "move": figure.move,
+            "commanded": self._commanded(figure),
+            "achieved": self._achieved(figure, track, result, duration_s),
+            "published": figure.published,
+            "frames": frames,
+            "bus_load": round(busy_s / duration_s, 4),
+            "cycles": cycles,
+            "late_cycles": late,
+        }
+        return FigureResult(figure, numbers, track, self._centre_of_rotation(figure))
+
+    def _counts(self) -> tuple[int, int, int, float]:
+        medium, counters = self.app.medium, self.app.cycle.counters
+        assert medium is not None
+        return sum(medium.frames.values()), counters.cycles, counters.late_cycles, medium.busy_s
+
+    async def _renew(self, lease: str) -> None:
+        while True:
+            await asyncio.sleep(0.5)
+            self.app.service.renew_lease(lease)
+
+    def _observer(self, track: Track, begin_s: float, origin: tuple[float, float, float]) -> Callable[[], None]:
+        app = self.app
+        assert app.network is not None
+        world, supervisor, loop = app.network.world, app.supervisor, asyncio.get_running_loop()
+
+        def look() -> None:
+            measurement = supervisor.measurement
+            assert measurement is not None
+            track.time_s.append(loop.time() - begin_s)
+            track.pose.append(_relative(world.pose, origin))
+            track.heading_rad.append(measurement.heading_rad)
+            track.commanded_m_s.append(supervisor.command.wheel_speed_m_s)
+            track.measured_m_s.append(measurement.wheel_speed_m_s)
+            track.slip_angle_rad.append(tuple(world.slip_angle_rad))
+
+        return look
+
+    def _centre_of_rotation(self, figure: Figure) -> tuple[float, float] | None:
+        rear, front = math.radians(figure.rear_deg), math.radians(figure.front_deg)
+        return solve_turning(self._geometry, rear, front, figure.speed_m_s).icr_m
+
+    def _commanded(self, figure: Figure) -> dict[str, Any]:
+        commanded: dict[str, Any] = {
+            "rear_deg": round(figure.rear_deg, 3),
+            "front_deg": round(figure.front_deg, 3),
+            "speed_m_s": figure.speed_m_s,
+            "duration_s": figure.duration_s,
+        }
+        icr = self._centre_of_rotation(figure)
+        if icr is not None:
+            return {**commanded, "radius_m": round(math.hypot(*icr), 4)}
+        distance, angle = figure.speed_m_s * figure.duration_s, math.radians(figure.rear_deg)
+        end = {"end_x_m": round(distance * math.cos(angle), 4), "end_y_m": round(distance * math.sin(angle), 4)}
+        return {**commanded, **end}
+
+    def _achieved(self, figure: Figure, track: Track, result: dict[str, Any], duration_s: float) -> dict[str, Any]:
+        assert self.app.network is not None
+        world = self.app.network.world
+        x, y, yaw = track.pose[-1]
+        radius = fitted_radius(track, figure.speed_m_s) if figure.move == "turn" else None
+        slip_deg = max(abs(angle) for row in steady(track) for angle in row)
+        return {
+            "end_x_m": round(x, 4),
+            "end_y_m": round(y, 4),
+            "heading_deg": round(math.degrees(yaw), 3),
+            "radius_m": None if radius is None else round(radius, 4),
+            "steering_error_deg": round(result["steering_error_deg"], 4),
+            "max_slip_ratio": round(world.max_slip_ratio, 4),
+            "max_slip_angle_deg": round(math.degrees(slip_deg), 3),
+            "duration_s": round(duration_s, 3),
+        }
+
+
+def steady(track: Track) -> list[tuple[float, ...]]:
+    """Slip angles of the wheels while the robot drives at its commanded speed."""
+    return [track.slip_angle_rad[row] for row in steady_rows(track)]
+
+
+def steady_rows(track: Track) -> list[int]:
+    """Rows of a track at the largest commanded speeds: after the start-up, before the ramp to rest."""
+    top = max(max(abs(speed) for speed in row) for row in track.commanded_m_s)
+    rows = [index for index, row in enumerate(track.commanded_m_s) if max(abs(speed) for speed in row) > 0.995 * top]
+    settled = [index for index in rows if track.time_s[index] > track.time_s[rows[0]] + 0.3]
+    return settled or rows
+
+
+def fitted_radius(track: Track, speed_m_s: float) -> float:
+    """Radius of the circle that fits the centre's steady track best (algebraic least squares) [m]."""
+    points = np.array([track.pose[row][:2] for row in steady_rows(track)])
+    matrix = np.column_stack([2 * points, np.ones(len(points))])
+    centre_x, centre_y, offset = np.linalg.lstsq(matrix, (points**2).sum(axis=1), rcond=None)[0]
+    return float(math.sqrt(offset + centre_x**2 + centre_y**2))
+
+
+def _relative(pose: tuple[float, float, float], origin: tuple[float, float, float]) -> tuple[float, float, float]:
+    dx, dy = pose[0] - origin[0], pose[1] - origin[1]
+    cos, sin = math.cos(origin[2]), math.sin(origin[2])
+    return (cos * dx + sin * dy, cos * dy - sin * dx, pose[2] - origin[2])

@@ -1,0 +1,110 @@
+"""Commands: each method that makes something happen, from its validated parameters to the supervisor."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from typing import Any
+
+from canhelm.errors import CanhelmError, Refused
+from daemon.runtime.brake_commands import BrakeCommands
+from daemon.runtime.handlers import Handler, Params, holder, run_motion
+from daemon.runtime.motions import Motion
+from daemon.runtime.motor_commands import MotorCommands
+from daemon.runtime.network_commands import NetworkCommands
+from daemon.runtime.supervisor import Supervisor
+
+
+class Commands:
+    """The methods of the API that command something, by name in :attr:`handlers`.
+
+    Args:
+        supervisor: what decides.
+        power: switches the supply of simulated nodes (``(node or "all", on)``); None on a real network.
+    """
+
+    def __init__(self, supervisor: Supervisor, power: Callable[[int | str, bool], None] | None = None) -> None:
+        self._supervisor = supervisor
+        self._power = power
+        self.handlers: dict[str, Handler] = {
+            "stop": self._stop,
+            "estop": self._estop,
+            "reset": self._reset,
+            "motion.wait": self._motion_wait,
+            "motion.stop": self._motion_stop,
+            "simulation.power": self._simulation_power,
+            **MotorCommands(supervisor).handlers,
+            **BrakeCommands(supervisor).handlers,
+            **NetworkCommands(supervisor).handlers,
+        }
+        for method in supervisor.vehicle.methods:
+            self.handlers[method] = self._vehicle_handler(method)
+
+    async def call(self, method: str, params: Params, lease: str | None) -> dict[str, Any]:
+        """Carry out one method.
+
+        Args:
+            method: its name, as in ``api.schema``.
+            params: validated parameters.
+            lease: the caller's lease, for motions.
+
+        Returns:
+            The method's result.
+
+        Raises:
+            CanhelmError: one of its leaves; Refused for a method that this vehicle does not have.
+        """
+        handler = self.handlers.get(method)
+        if handler is None:
+            have = ", ".join(sorted(self._supervisor.vehicle.methods)) or "none"
+            raise Refused(f"this vehicle has no {method}", remedy=f"motions that it has: {have}")
+        return await handler(params, lease)
+
+    # --- the whole vehicle -------------------------------------------------------------------------------------
+
+    async def _stop(self, params: Params, lease: str | None) -> dict[str, Any]:
+        await self._supervisor.stop("stop was commanded")
+        return {"state": self._supervisor.state.value}
+
+    async def _estop(self, params: Params, lease: str | None) -> dict[str, Any]:
+        self._supervisor.estop(str(params.get("reason") or "commanded by a person"))
+        return {"state": self._supervisor.state.value, "message": self._supervisor.message}
+
+    async def _reset(self, params: Params, lease: str | None) -> dict[str, Any]:
+        return await self._supervisor.reset()
+
+    def _vehicle_handler(self, method: str) -> Handler:
+        async def handle(params: Params, lease: str | None) -> dict[str, Any]:
+            supervisor = self._supervisor
+            supervisor.require_ready(())
+            running = supervisor.vehicle.update(method, params, lease, list(supervisor.motions.values()))
+            if running is not None:
+                return running
+            motion = supervisor.vehicle.motion(method, params, holder(params, lease))
+            return await run_motion(supervisor, motion, params)
+
+        return handle
+
+    def _motion(self, params: Params) -> Motion:
+        motion = self._supervisor.motions.get(str(params["motion"]))
+        if motion is None:
+            raise Refused(f"no motion {params['motion']} is running", remedy="`canhelm status` shows the motions")
+        return motion
+
+    async def _motion_wait(self, params: Params, lease: str | None) -> dict[str, Any]:
+        motion = self._motion(params)
+        return {"motion": motion.identity, **await motion.ended}
+
+    async def _motion_stop(self, params: Params, lease: str | None) -> dict[str, Any]:
+        motion = self._motion(params)
+        motion.stop("its client stopped it")
+        with contextlib.suppress(CanhelmError):
+            await motion.ended
+        await self._supervisor.until_rest()
+        return {"motion": motion.identity, "state": self._supervisor.state.value}
+
+    async def _simulation_power(self, params: Params, lease: str | None) -> dict[str, Any]:
+        if self._power is None:
+            raise Refused("this network is real: its power is switched by hand")
+        self._power(params["node"], bool(params["on"]))
+        return {"node": params["node"], "on": bool(params["on"])}

@@ -1,0 +1,114 @@
+"""The control cycle: SYNC out, readings in, one step, targets out."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from daemon.runtime.clock import Ticker
+from drivers.canopen.master import Master
+from drivers.contract import NodeState
+from drivers.devices import Devices
+
+READING_SHARE = 0.5
+"""Share of the period that the readings may take before the step runs without those that are missing."""
+
+
+@dataclass(slots=True)
+class CycleCounters:
+    """How the cycle fares.
+
+    Attributes:
+        cycles: steps run.
+        late_cycles: steps that ended after their period, and ticks that came a period late or more.
+        incomplete: steps that ran without some node's reading.
+        max_lateness_s: worst delay of a tick behind its time.
+    """
+
+    cycles: int = 0
+    late_cycles: int = 0
+    incomplete: int = 0
+    max_lateness_s: float = 0.0
+
+
+class Cycle:
+    """Runs ``step(now_s, dt_s)`` once per period, as soon as every node's reading of the cycle is there.
+
+    A good cycle, one whose step ended within its period, sends the guard requests that are due; so a daemon that hangs
+    stops guarding and its drives stop by themselves.
+
+    Args:
+        master: sends SYNC and guard requests.
+        devices: tell of each reading.
+        period_s: the cycle's period.
+        step: the control step; must not block.
+    """
+
+    def __init__(self, master: Master, devices: Devices, period_s: float, step: Callable[[float, float], None]) -> None:
+        self.counters = CycleCounters()
+        self.period_s = period_s
+        self._master = master
+        self._devices = devices
+        self._step = step
+        self._ticker = Ticker(period_s, self._tick)
+        self._missing: set[int] = set()
+        self._waiting = False
+        self._tick_s = 0.0
+        self._last_step_s: float | None = None
+        self._deadline: asyncio.TimerHandle | None = None
+        devices.on_reading = self._on_reading
+
+    def start(self) -> None:
+        """Begin ticking on the running loop."""
+        self._loop = asyncio.get_running_loop()
+        self._ticker.start()
+
+    def stop(self) -> None:
+        """End ticking."""
+        self._ticker.stop()
+        if self._deadline is not None:
+            self._deadline.cancel()
+
+    def _tick(self) -> None:
+        if self._waiting:
+            self._run()
+        self._tick_s = self._loop.time()
+        ready = NodeState.READY
+        self._missing = {node for node, device in self._devices.by_node.items() if device.node_state is ready}
+        self._master.sync()
+        self._waiting = True
+        if self._missing:
+            self._deadline = self._loop.call_at(self._tick_s + READING_SHARE * self.period_s, self._on_deadline)
+        else:
+            self._run()
+
+    def _on_reading(self, node: int) -> None:
+        if self._waiting:
+            self._missing.discard(node)
+            if not self._missing:
+                self._run()
+
+    def _on_deadline(self) -> None:
+        if self._waiting:
+            self.counters.incomplete += 1
+            self._run()
+
+    def _run(self) -> None:
+        self._waiting = False
+        if self._deadline is not None:
+            self._deadline.cancel()
+            self._deadline = None
+        now = self._loop.time()
+        dt = self.period_s if self._last_step_s is None else min(now - self._last_step_s, 5 * self.period_s)
+        self._last_step_s = now
+        self._step(now, dt)
+        counters = self.counters
+        counters.cycles += 1
+        end = self._loop.time()
+        lateness = self._ticker.max_lateness_s
+        counters.max_lateness_s = max(counters.max_lateness_s, lateness)
+        if end <= self._tick_s + self.period_s:
+            self._master.guard_due(end)
+        else:
+            counters.late_cycles += 1

@@ -1,0 +1,36 @@
+"""What the command modules share: types of handlers, and how a motion is run and held."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from canhelm.errors import UsageError
+from daemon.runtime.motions import Motion
+from daemon.runtime.supervisor import Supervisor
+
+Params = dict[str, Any]
+Handler = Callable[[Params, str | None], Awaitable[dict[str, Any]]]
+
+
+async def run_motion(supervisor: Supervisor, motion: Motion, params: Params) -> dict[str, Any]:
+    """Admit a motion; return its result when it is over, or its id at once where the caller does not wait."""
+    supervisor.admit(motion)
+    if motion.streaming or not params.get("wait", True):
+        return {"motion": motion.identity}
+    return {"motion": motion.identity, **await motion.ended}
+
+
+def holder(params: Params, lease: str | None, *, endless: bool = False) -> str | None:
+    """The lease that holds a motion: the caller's, or none where a finite motion is handed over to the daemon.
+
+    Raises:
+        UsageError: a motion without an end cannot be handed over.
+    """
+    if params.get("wait", True):
+        return lease
+    if endless:
+        raise UsageError(
+            "a motion without an end cannot be handed over to the daemon", remedy="give a duration, or wait for it"
+        )
+    return None

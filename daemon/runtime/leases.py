@@ -1,0 +1,69 @@
+"""Leases: a motion belongs to somebody alive, who renews."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+from dataclasses import dataclass
+
+from canhelm.errors import Refused
+
+
+@dataclass(slots=True)
+class Lease:
+    """One client's hold on its motions.
+
+    Attributes:
+        client: who holds it, for people.
+        expires_s: loop time at which it runs out unless renewed.
+    """
+
+    client: str
+    expires_s: float
+
+
+class Leases:
+    """All leases; the control cycle asks which have run out.
+
+    Args:
+        timeout_s: how long a lease lives without a renewal.
+    """
+
+    def __init__(self, timeout_s: float) -> None:
+        self.timeout_s = timeout_s
+        self._leases: dict[str, Lease] = {}
+        self._numbers = itertools.count(1)
+
+    def open(self, client: str) -> str:
+        """A new lease for a client; returns its id."""
+        lease = f"lease-{next(self._numbers)}"
+        self._leases[lease] = Lease(client, asyncio.get_running_loop().time() + self.timeout_s)
+        return lease
+
+    def renew(self, lease: str) -> None:
+        """Keep a lease alive. Raises Refused where it has run out or never was."""
+        self._known(lease).expires_s = asyncio.get_running_loop().time() + self.timeout_s
+
+    def client(self, lease: str) -> str:
+        """Who holds a lease. Raises Refused where it has run out or never was."""
+        return self._known(lease).client
+
+    def close(self, lease: str) -> None:
+        """End a lease; its motions are the caller's to stop."""
+        self._leases.pop(lease, None)
+
+    def expired(self, now_s: float) -> list[tuple[str, str]]:
+        """Take out the leases that have run out: their ids and clients."""
+        gone = [(lease, entry.client) for lease, entry in self._leases.items() if entry.expires_s < now_s]
+        for lease, _ in gone:
+            del self._leases[lease]
+        return gone
+
+    def _known(self, lease: str) -> Lease:
+        try:
+            return self._leases[lease]
+        except KeyError:
+            raise Refused(
+                f"{lease} has run out or was never opened",
+                remedy="renew a lease at least every 0.5 s while a motion runs, and command the motion again",
+            ) from None

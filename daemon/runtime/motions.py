@@ -1,0 +1,202 @@
+"""Motions: each thing that somebody asked a vehicle or a motor to do, from its begin to its end."""
+
+from __future__ import annotations
+
+import asyncio
+from abc import ABC, abstractmethod
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from canhelm.errors import CanhelmError, Refused
+from daemon.loops.measurement import Command, Measurement
+from drivers.contract import Drive
+
+
+class Motion(ABC):
+    """One motion.
+
+    The supervisor enables the drives it needs, calls :meth:`step` once a cycle until :attr:`ended` is set, and then
+    leaves the drives as it found them.
+
+    Args:
+        kind: the method that asked for it (``drive.turn``).
+        drives: names of the drives it moves.
+        lease: who holds it; None for a finite motion that was handed to the daemon.
+
+    Attributes:
+        identity: number by which clients name it.
+        ended: holds the result, or the error that ended it.
+    """
+
+    streaming = False
+    """True for a motion whose caller does not wait for it but goes on with new values."""
+
+    def __init__(self, kind: str, drives: tuple[str, ...], lease: str | None) -> None:
+        self.identity = ""
+        self.kind = kind
+        self.drives = drives
+        self.lease = lease
+        self.running = False
+        self.stop_reason = ""
+        self.begun_s = 0.0
+        self.ended: asyncio.Future[dict[str, Any]] = asyncio.get_running_loop().create_future()
+        self.ended.add_done_callback(_observe)
+
+    @abstractmethod
+    def step(self, measurement: Measurement, dt_s: float) -> Command:
+        """One cycle: what the wheels shall do now. Calls :meth:`finish` or :meth:`fail` when it is over."""
+
+    async def start(self) -> None:
+        """Called once when the drives are enabled, before the first step."""
+
+    def begin(self, now_s: float) -> None:
+        """From now on :meth:`step` is called."""
+        self.running = True
+        self.begun_s = now_s
+
+    def stop(self, reason: str) -> None:
+        """Bring the motion to rest by its ramp and end it."""
+        self.stop_reason = self.stop_reason or reason
+
+    def progress(self) -> dict[str, Any]:
+        """How far it is, for ``status``."""
+        return {}
+
+    def summary(self) -> dict[str, Any]:
+        """The motion for ``status``."""
+        return {"motion": self.identity, "kind": self.kind, "drives": list(self.drives), **self.progress()}
+
+    def finish(self, result: dict[str, Any]) -> None:
+        """End well, or as stopped where a stop was asked for."""
+        if self.ended.done():
+            return
+        if self.stop_reason:
+            self.fail(Refused(f"the motion was stopped: {self.stop_reason}", value=self.progress() or None))
+        else:
+            self.ended.set_result(result)
+
+    def fail(self, error: CanhelmError) -> None:
+        """End with an error."""
+        if not self.ended.done():
+            self.ended.set_exception(error)
+
+
+def _observe(future: asyncio.Future[dict[str, Any]]) -> None:
+    """Mark an error as seen: whoever waits for the motion hears of it, and often nobody does."""
+    if not future.cancelled():
+        future.exception()
+
+
+class WheelVelocity(Motion):
+    """One wheel at a speed, for a time or until stopped.
+
+    Args:
+        wheel: index of the wheel in the vehicle's order.
+        drive: its drive.
+        speed_m_s: target speed at the rim.
+        duration_s: time from the begin after which it ends; None: until stopped.
+        wheel_count: number of wheels of the vehicle.
+    """
+
+    AT_REST_M_S = 0.01
+
+    def __init__(
+        self,
+        kind: str,
+        drive: Drive,
+        wheel: int,
+        wheel_count: int,
+        speed_m_s: float,
+        duration_s: float | None,
+        lease: str | None,
+    ) -> None:
+        super().__init__(kind, (drive.name,), lease)
+        self._drive = drive
+        self._wheel = wheel
+        self._count = wheel_count
+        self._speed_m_s = speed_m_s
+        self._remaining_s = duration_s
+        self._travel_m: float | None = None
+
+    def step(self, measurement: Measurement, dt_s: float) -> Command:
+        """The target until the time is over, then zero until the wheel is at rest."""
+        travel = measurement.wheel_travel_m[self._wheel]
+        self._travel_m = travel if self._travel_m is None else self._travel_m
+        if self._remaining_s is not None:
+            self._remaining_s -= dt_s
+        over = bool(self.stop_reason) or (self._remaining_s is not None and self._remaining_s <= 0.0)
+        speed = measurement.wheel_speed_m_s[self._wheel]
+        if over and abs(speed) < self.AT_REST_M_S:
+            self.finish({"wheel_travel_m": round(travel - self._travel_m, 6)})
+        wheels = [0.0] * self._count
+        wheels[self._wheel] = 0.0 if over else self._speed_m_s
+        return Command(tuple(wheels))
+
+    def progress(self) -> dict[str, Any]:
+        """Target and measured speed, and the time left."""
+        left = None if self._remaining_s is None else max(0.0, round(self._remaining_s, 3))
+        return {
+            "target_velocity_rpm": round(self._drive.rpm_from_speed(self._speed_m_s), 1),
+            "velocity_rpm": round(self._drive.rpm_from_speed(self._drive.speed_m_s), 1),
+            "remaining_s": left,
+        }
+
+
+class DriveMove(Motion):
+    """A move that the drive carries out itself: profile position, homing, or current for a time.
+
+    Args:
+        drive: the drive.
+        wheel_count: number of wheels of the vehicle.
+        command: commands the move to the drive.
+        duration_s: time after which it ends; None: when the drive reports its target reached (or until stopped, with
+            ``until_stopped``).
+        until_stopped: the move has no end of its own.
+    """
+
+    SETTLE_CYCLES = 3
+
+    def __init__(
+        self,
+        kind: str,
+        drive: Drive,
+        wheel_count: int,
+        lease: str | None,
+        command: Callable[[], Awaitable[None]],
+        *,
+        duration_s: float | None = None,
+        until_stopped: bool = False,
+    ) -> None:
+        super().__init__(kind, (drive.name,), lease)
+        self._drive = drive
+        self._zero = Command((0.0,) * wheel_count)
+        self._remaining_s = duration_s
+        self._until_stopped = until_stopped
+        self._settled = 0
+        self._command = command
+
+    async def start(self) -> None:
+        """Command the move."""
+        await self._command()
+
+    def step(self, measurement: Measurement, dt_s: float) -> Command:
+        """Watch the drive: over when its target is reached, its time is out or it was stopped."""
+        if self._remaining_s is not None:
+            self._remaining_s -= dt_s
+            over = self._remaining_s <= 0.0
+        else:
+            self._settled = self._settled + 1 if self._drive.at_target and not self._until_stopped else 0
+            over = self._settled >= self.SETTLE_CYCLES
+        if over or self.stop_reason:
+            if self.stop_reason:
+                self._drive.quick_stop()
+            self.finish({"position_m": round(self._drive.position_m, 6)})
+        return self._zero
+
+    def progress(self) -> dict[str, Any]:
+        """Measured position, speed and current."""
+        return {
+            "position_m": round(self._drive.position_m, 6),
+            "velocity_rpm": round(self._drive.rpm_from_speed(self._drive.speed_m_s), 1),
+            "current_a": round(self._drive.current_a, 3),
+        }

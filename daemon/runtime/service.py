@@ -1,0 +1,89 @@
+"""What the API serves: the vehicle's status, its leases and its methods, in one place."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Any
+
+from daemon.runtime.commands import Commands
+from daemon.runtime.cycle import Cycle
+from daemon.runtime.supervisor import Supervisor
+from drivers.bus.contract import Bus
+
+EVENTS_SHOWN = 10
+
+
+class Service:
+    """One robot's daemon as its clients see it.
+
+    Args:
+        robot: the profile's name.
+        supervisor: state, motions and leases.
+        commands: the methods.
+        bus: for load and counters.
+        cycle: for its counters.
+    """
+
+    def __init__(self, robot: str, supervisor: Supervisor, commands: Commands, bus: Bus, cycle: Cycle) -> None:
+        self.robot = robot
+        self.call = commands.call
+        self.open_lease = supervisor.open_lease
+        self.renew_lease = supervisor.renew_lease
+        self.close_lease = supervisor.close_lease
+        self._supervisor = supervisor
+        self._bus = bus
+        self._cycle = cycle
+
+    @property
+    def state(self) -> str:
+        """The vehicle's state."""
+        return self._supervisor.state.value
+
+    @property
+    def lease_timeout_s(self) -> float:
+        """How long a motion goes on without a renewal."""
+        return self._supervisor.lease_timeout_s
+
+    @property
+    def events(self) -> list[Callable[[dict[str, Any]], None]]:
+        """Callbacks that hear of each event."""
+        return self._supervisor.log.listeners
+
+    def status(self) -> dict[str, Any]:
+        """Everything at a glance; keys carry units, values are plain JSON."""
+        supervisor = self._supervisor
+        return {
+            "robot": self.robot,
+            "state": self.state,
+            "message": supervisor.message,
+            "time_s": round(asyncio.get_running_loop().time(), 3),
+            "nodes": [device.status() for _, device in sorted(supervisor.devices.by_node.items())],
+            "brakes": [brake.status() for brake in supervisor.devices.brakes.values()],
+            "vehicle": supervisor.vehicle.status(),
+            "limits_active": list(supervisor.active_limits),
+            "motions": [motion.summary() for motion in supervisor.motions.values()],
+            "bus": self._bus_status(),
+            "cycle": self._cycle_status(),
+            "events": supervisor.log.last(EVENTS_SHOWN),
+        }
+
+    def _bus_status(self) -> dict[str, Any]:
+        return {
+            "name": self._bus.name,
+            "bit_rate": self._bus.bit_rate,
+            "load": round(self._bus.load(), 4),
+            **asdict(self._bus.counters),
+            **asdict(self._supervisor.master.counters),
+        }
+
+    def _cycle_status(self) -> dict[str, Any]:
+        counters = self._cycle.counters
+        return {
+            "hz": round(1.0 / self._cycle.period_s, 3),
+            "cycles": counters.cycles,
+            "late_cycles": counters.late_cycles,
+            "incomplete_cycles": counters.incomplete,
+            "max_lateness_ms": round(counters.max_lateness_s * 1e3, 3),
+        }
