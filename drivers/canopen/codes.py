@@ -310,3 +310,38 @@ ERROR_REGISTER_BITS: tuple[BitDef, ...] = (
     BitDef(7, "manufacturer", "manufacturer specific: motion or sensor error"),
 )
 """Bits of the error register 0x1001 (CiA 301 7.5.2.2)."""
+
+EMCY_CLASSES = {
+    0x00: "no error",
+    0x10: "generic error",
+    0x20: "current",
+    0x21: "current at the input side",
+    0x22: "current inside the device",
+    0x23: "current at the output side",
+    0x30: "voltage",
+    0x31: "mains voltage",
+    0x32: "voltage inside the device",
+    0x33: "output voltage",
+    0x40: "temperature",
+    0x41: "ambient temperature",
+    0x42: "temperature of the device",
+    0x50: "device hardware",
+    0x60: "device software",
+    0x61: "internal software",
+    0x62: "user software",
+    0x63: "data set",
+    0x70: "additional modules",
+    0x80: "monitoring",
+    0x81: "communication",
+    0x82: "protocol",
+    0x90: "external error",
+    0xF0: "additional functions",
+    0xFF: "device specific",
+}
+"""What the high byte of any emergency code stands for (CiA 301 7.2.7.1)."""
+
+
+def emcy_class(code: int) -> str:
+    """What kind of error an emergency code is, known or not: by its high byte, else by the first digit of it."""
+    high = code >> 8 & 0xFF
+    return EMCY_CLASSES.get(high) or EMCY_CLASSES.get(high & 0xF0, "unknown kind")

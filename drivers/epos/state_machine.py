@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
-from drivers.canopen.objects import BitDef
+from drivers.canopen.objects import BitDef, CodeDef
 
 STATE_MASK = 0x417F
 """Bits of the statusword that name the state: 0 to 6, 8 and 14."""
@@ -54,6 +54,61 @@ _STATES = {int(state): state for state in State}
 def state_of(statusword: int) -> State | None:
     """The state that a statusword names, or None where its bits fit no state."""
     return _STATES.get(statusword & STATE_MASK)
+
+
+_WAIT = "Wait; the drive goes on by itself."
+_RESET = "Read the error history (0x1003/1), cure the cause, then reset the fault."
+
+STATES: dict[State, CodeDef] = {
+    State(entry.code): entry
+    for entry in (
+        CodeDef(State.START, "start", "The drive boots.", "Power-up or NMT reset node.", _WAIT),
+        CodeDef(State.NOT_READY_TO_SWITCH_ON, "not ready to switch on", "The drive initialises itself.", "", _WAIT),
+        CodeDef(
+            State.SWITCH_ON_DISABLED,
+            "switch on disabled",
+            "Initialised, power stage off, no command given yet.",
+            "Just booted, disabled, or a fault was reset.",
+            "Enable the drive when it shall move.",
+        ),
+        CodeDef(State.READY_TO_SWITCH_ON, "ready to switch on", "Power stage off, first step of enabling done."),
+        CodeDef(State.SWITCHED_ON, "switched on", "Power stage off, second step of enabling done."),
+        CodeDef(
+            State.REFRESH,
+            "refresh",
+            "The power stage refreshes itself; operation enabled follows.",
+            "Enable operation was commanded.",
+            _WAIT,
+        ),
+        CodeDef(
+            State.MEASURE_INIT, "measure init", "The drive measures before it enables (later firmware).", "", _WAIT
+        ),
+        CodeDef(State.OPERATION_ENABLED, "operation enabled", "Power stage on; the drive follows its set value."),
+        CodeDef(
+            State.QUICK_STOP_ACTIVE,
+            "quick stop active",
+            "Ramping down or standing still after a quick stop, power stage on.",
+            "Quick stop was commanded.",
+            "Disable the drive, or enable operation to go on.",
+        ),
+        CodeDef(
+            State.FAULT_REACTION_DISABLED,
+            "fault reaction, was disabled",
+            "A fault came up while the power stage was off.",
+            "The emergency message tells.",
+            _RESET,
+        ),
+        CodeDef(
+            State.FAULT_REACTION_ENABLED,
+            "fault reaction, was enabled",
+            "A fault came up while the drive was enabled; it stops by the class of the fault.",
+            "The emergency message tells.",
+            _RESET,
+        ),
+        CodeDef(State.FAULT, "fault", "Power stage off because of a fault.", "The emergency message tells.", _RESET),
+    )
+}
+"""Each state in words, with cause and cure."""
 
 
 class Command(IntEnum):
