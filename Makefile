@@ -1,0 +1,45 @@
+# canhelm: `make demo` on a fresh machine drives the simulated robot, `make test` proves the code.
+# Needs python3 (3.11 or later, with its venv module) and make.
+
+PYTHON ?= python3
+VENV := .venv
+PIP := $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check
+OUT ?= demo-out
+
+.DEFAULT_GOAL := help
+.PHONY: help venv demo test lint
+
+help: ## this list
+	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST)
+
+venv: $(VENV)/.stamp-demo ## canhelm in .venv
+
+demo: $(VENV)/.stamp-demo ## the simulated robot drives the published manoeuvres; pictures into demo-out/
+	$(VENV)/bin/canhelm demo --out $(OUT)
+
+test: lint ## style, types, import rules, then all tests
+	$(VENV)/bin/pytest
+
+lint: $(VENV)/.stamp-test ## style, types and import rules
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/mypy
+	$(VENV)/bin/lint-imports
+
+$(VENV)/bin/pip:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+		|| { echo "canhelm needs Python 3.11 or later: make PYTHON=/path/to/python3.11 venv" >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip' 2>/dev/null \
+		|| { echo "Python's venv module is missing; install it with: apt install python3-venv" >&2; exit 1; }
+	@echo "creating $(VENV)"
+	@$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.stamp-demo: pyproject.toml | $(VENV)/bin/pip
+	@echo "installing canhelm and what its pictures need into $(VENV)"
+	@$(PIP) --editable '.[plot]'
+	@touch $@
+
+$(VENV)/.stamp-test: pyproject.toml | $(VENV)/bin/pip
+	@echo "installing canhelm and what its tests need into $(VENV)"
+	@$(PIP) --editable '.[plot,test]'
+	@touch $@
