@@ -241,7 +241,7 @@ def _parts_of(profile: Profile) -> tuple[PairedSteerGeometry, SimulationConfig]:
 
 
 def _rim_mobility(profile: Profile, vehicle: PairedSteerGeometry, simulation: SimulationConfig) -> float:
-    """Acceleration at a rim per force [1/kg]: of the lightest wheel, the pair about its axes, the body on four tyres."""
+    """Acceleration at a rim per force [1/kg]: of the lightest wheel, of a pair about its axes, of the body."""
     wheels = (profile.drives[name] for name in vehicle.wheels)
     lightest = min(
         (simulation.wheel_inertia_kg_m2 + drive.total_ratio**2 * drive.motor.rotor_inertia_kg_m2)

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import json
 from itertools import pairwise
-from math import cos, degrees, hypot, radians, sin
+from math import cos, radians, sin
 from pathlib import Path
 
 import msgspec
@@ -11,119 +11,9 @@ import pytest
 from canhelm.errors import ConfigError
 from drivers.simulated.max2d import Max2dWorld
 from drivers.simulated.world import STEP_S, World
-from profiles.loader import load
-from profiles.schema import DriveConfig, PairedSteerGeometry, Profile, SimulationConfig
+from vcan_tests.drivers.max2d_bench import PROFILE, Robot, SpeedSource, turning_speeds, with_tyre
 
-PROFILE = load("max2d").profile
 VECTORS = Path(__file__).parents[1] / "vectors" / "seed001_turning.json"
-START = (0.0, 0.0, 0.0)
-
-
-def vehicle() -> PairedSteerGeometry:
-    assert PROFILE.vehicle is not None
-    return PROFILE.vehicle
-
-
-def simulation() -> SimulationConfig:
-    assert PROFILE.simulation is not None
-    return PROFILE.simulation
-
-
-def with_tyre(**values: float) -> Profile:
-    tyre = msgspec.structs.replace(simulation().tyre, **values)
-    return msgspec.structs.replace(PROFILE, simulation=msgspec.structs.replace(simulation(), tyre=tyre))
-
-
-class SpeedSource:
-    """A stiff PI speed controller: as near to a commanded wheel speed as the motor allows."""
-
-    def __init__(self, config: DriveConfig) -> None:
-        self.target_m_s = 0.0
-        self._shaft_per_m_s = config.direction * config.total_ratio / config.wheel_radius_m
-        self._sum_a = 0.0
-
-    def current_demand(self, speed_rad_s: float, position_rad: float, dt_s: float) -> float:
-        error = self.target_m_s * self._shaft_per_m_s - speed_rad_s
-        self._sum_a = min(max(self._sum_a + 0.5 * error * dt_s, -5.0), 5.0)
-        return min(max(0.05 * error + self._sum_a, -5.0), 5.0)
-
-
-class Robot:
-    """The simulated MAX2D with a speed source on each wheel."""
-
-    def __init__(
-        self,
-        profile: Profile = PROFILE,
-        headings: tuple[float, float] = (0.0, 0.0),
-        start: tuple[float, float, float] = START,
-        step_s: float = STEP_S,
-    ) -> None:
-        self.world = Max2dWorld(profile, seed=1, start=start, step_s=step_s)
-        self.sources = [SpeedSource(profile.drives[name]) for name in vehicle().wheels]
-        for name, source in zip(vehicle().wheels, self.sources, strict=True):
-            self.world.axes[name].torque_source = source
-        self.world.set_heading("rear", headings[0])
-        self.world.set_heading("front", headings[1])
-        self.now_s = 0.0
-        self.world.advance(0.0)
-
-    def roll(self, *speeds_m_s: float, for_s: float) -> None:
-        for source, speed in zip(self.sources, speeds_m_s, strict=True):
-            source.target_m_s = speed
-        self.now_s += for_s
-        self.world.advance(self.now_s)
-
-    def speed_up(self, *speeds_m_s: float, within_s: float = 1.0) -> None:
-        for part in range(1, 51):
-            self.roll(*(speed * part / 50 for speed in speeds_m_s), for_s=within_s / 50)
-
-    def power_off(self) -> None:
-        for axis in self.world.axes.values():
-            axis.torque_source = None
-
-    def kinetic_energy(self) -> float:
-        vx, vy, yaw_rate = self.world.velocity
-        energy = vehicle().mass_kg * (vx * vx + vy * vy) + vehicle().yaw_inertia_kg_m2 * yaw_rate**2
-        for name, wheel in self.world.wheels.items():
-            config = PROFILE.drives[name]
-            reflected = config.total_ratio**2 * config.motor.rotor_inertia_kg_m2
-            energy += (simulation().wheel_inertia_kg_m2 + reflected) * wheel.drive.wheel_rad_s**2
-        return energy / 2.0
-
-    def driven_radius(self) -> float:
-        vx, vy, yaw_rate = self.world.velocity
-        return hypot(vx, vy) / abs(yaw_rate)
-
-
-def contact_points(rear: float, front: float) -> list[tuple[float, float]]:
-    """Contact points of wheels 1 to 4."""
-    car = vehicle()
-    points = []
-    for ahead, left in ((-1, -1), (-1, 1), (1, 1), (1, -1)):
-        heading = front if ahead > 0 else rear
-        lead, out = ahead * car.contact_lead_m, left * car.contact_offset_m
-        x = ahead * car.wheelbase_m / 2 + lead * cos(heading) - out * sin(heading)
-        y = left * car.pivot_track_m / 2 + lead * sin(heading) + out * cos(heading)
-        points.append((x, y))
-    return points
-
-
-def turning_speeds(rear: float, front: float, speed_m_s: float) -> tuple[float, list[float]]:
-    """Radius of the centre and wheel speeds about the mean of both sides' intersections of axle lines (speed > 0)."""
-    points = contact_points(rear, front)
-    along = [(-sin(heading), cos(heading)) for heading in (rear, rear, front, front)]
-    crossings = [_crossing(points[i], along[i], points[j], along[j]) for i, j in ((0, 3), (1, 2))]
-    x, y = (sum(values) / 2 for values in zip(*crossings, strict=True))
-    radius = hypot(x, y)
-    return radius, [speed_m_s / radius * hypot(px - x, py - y) for px, py in points]
-
-
-def _crossing(
-    p: tuple[float, float], u: tuple[float, float], q: tuple[float, float], v: tuple[float, float]
-) -> tuple[float, float]:
-    """Where the lines p + t u and q + t v cross."""
-    t = ((q[0] - p[0]) * v[1] - (q[1] - p[1]) * v[0]) / (u[0] * v[1] - u[1] * v[0])
-    return p[0] + t * u[0], p[1] + t * u[1]
 
 
 def test_the_world_fulfils_its_contract() -> None:
@@ -214,76 +104,6 @@ def test_the_start_pose_moves_the_whole_drive() -> None:
         robot.speed_up(0.5, 0.3, 0.35, 0.55)
     x, y, yaw = here.world.pose
     assert there.world.pose == pytest.approx((1.0 - y, 2.0 + x, yaw + radians(90)), abs=1e-9)
-
-
-def steer_front(robot: Robot, rim_m_s: float, for_s: float) -> None:
-    robot.world.set_brake("front", engaged=False)
-    robot.roll(0.0, 0.0, -rim_m_s, rim_m_s, for_s=for_s)
-
-
-def test_a_released_pair_turns_with_its_rim_speed_over_the_offset() -> None:
-    robot = Robot()
-    steer_front(robot, 0.1, for_s=0.5)
-    before = robot.world.heading_rad("front")
-    steer_front(robot, 0.1, for_s=0.3)
-    rate = (robot.world.heading_rad("front") - before) / 0.3
-    assert rate == pytest.approx(0.1 / vehicle().contact_offset_m, rel=0.03)
-
-
-def test_the_braked_pair_keeps_its_heading_meanwhile() -> None:
-    robot = Robot(headings=(0.3, 0.0))
-    steer_front(robot, 0.15, for_s=0.8)
-    assert robot.world.heading_rad("rear") == 0.3
-
-
-def test_the_body_stays_where_it_is_while_a_pair_turns() -> None:
-    robot = Robot()
-    steer_front(robot, 0.1, for_s=0.8)
-    x, y, yaw = robot.world.pose
-    assert hypot(x, y) < 0.005
-    assert abs(degrees(yaw)) < 1.0
-
-
-def test_a_braked_pair_does_not_turn_however_its_wheels_pull() -> None:
-    robot = Robot()
-    robot.roll(0.0, 0.0, -0.1, 0.1, for_s=0.5)
-    assert robot.world.heading_rad("front") == 0.0
-
-
-def test_a_weak_brake_slips() -> None:
-    weak = msgspec.structs.replace(simulation(), brake_holding_torque_n_m=1.0)
-    robot = Robot(msgspec.structs.replace(PROFILE, simulation=weak))
-    robot.roll(0.0, 0.0, -0.15, 0.15, for_s=0.5)
-    assert robot.world.heading_rad("front") > 0.05
-
-
-def test_an_engaged_brake_stops_a_turning_pair_at_once() -> None:
-    robot = Robot()
-    steer_front(robot, 0.15, for_s=0.5)
-    robot.world.set_brake("front", engaged=True)
-    robot.roll(0.0, 0.0, -0.15, 0.15, for_s=0.01)
-    assert robot.world.pairs["front"].rate_rad_s == 0.0
-
-
-@pytest.mark.parametrize("side", [1, -1])
-def test_a_pair_ends_at_its_stop(side: int) -> None:
-    robot = Robot()
-    steer_front(robot, side * 0.15, for_s=1.5)
-    assert side * degrees(robot.world.heading_rad("front")) == pytest.approx(vehicle().max_heading_deg, abs=0.2)
-
-
-def test_a_pair_comes_back_from_its_stop() -> None:
-    robot = Robot()
-    steer_front(robot, 0.15, for_s=1.5)
-    steer_front(robot, -0.15, for_s=0.8)
-    assert degrees(robot.world.heading_rad("front")) < 60.0
-
-
-def test_equal_speeds_of_a_released_pair_push_the_body_and_do_not_steer() -> None:
-    robot = Robot()
-    robot.world.set_brake("front", engaged=False)
-    robot.roll(0.0, 0.0, 0.05, 0.05, for_s=0.5)
-    assert abs(degrees(robot.world.heading_rad("front"))) < 0.01
 
 
 def test_a_robot_without_power_rolls_out_to_exact_rest() -> None:

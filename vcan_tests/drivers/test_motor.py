@@ -57,9 +57,11 @@ def test_the_motor_meets_its_published_load_point() -> None:
     assert drive.axis.current_a == pytest.approx(2.64, rel=0.01)
 
 
-def test_without_load_only_the_no_load_current_flows() -> None:
+@pytest.mark.parametrize("sense", [1, -1])
+def test_without_load_only_the_no_load_current_flows(sense: int) -> None:
     lossless = msgspec.structs.replace(LEFT, gear_efficiency=1.0)
-    assert run(lossless, current_a=5.0).axis.current_a == pytest.approx(LEFT.motor.no_load_current_a, rel=1e-3)
+    drive = run(lossless, current_a=sense * 5.0)
+    assert drive.axis.current_a == pytest.approx(sense * LEFT.motor.no_load_current_a, rel=1e-3)
 
 
 def test_less_than_the_no_load_current_does_not_move_the_wheel() -> None:
