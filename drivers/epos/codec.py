@@ -1,0 +1,42 @@
+"""Process data of the EPOS 24/5 as canhelm maps it: pure bytes.
+
+TPDO1 and RPDO1 go with SYNC; RPDO3, whose mapping is fixed (maxon EPOS Firmware Specification 14.1.18), counts at once.
+"""
+
+from __future__ import annotations
+
+from drivers.canopen.pdo import pdo_struct
+from drivers.epos.objects import OBJECTS
+from drivers.epos.state_machine import Mode
+
+TPDO1_MAP = (OBJECTS["statusword"], OBJECTS["position_actual_value"], OBJECTS["current_actual_value"])
+TPDO1 = pdo_struct(TPDO1_MAP)
+TPDO1_BYTES = TPDO1.size
+
+TARGET_OBJECT = {
+    Mode.PROFILE_VELOCITY: OBJECTS["target_velocity"],
+    Mode.VELOCITY: OBJECTS["velocity_mode_setting_value"],
+}
+"""Where the target speed of a driving mode is written to, in rpm."""
+
+RPDO1_MAPS = {mode: (OBJECTS["controlword"], target) for mode, target in TARGET_OBJECT.items()}
+RPDO1 = pdo_struct(RPDO1_MAPS[Mode.PROFILE_VELOCITY])
+RPDO3 = pdo_struct((OBJECTS["controlword"], OBJECTS["mode_of_operation"]))
+
+DRIVING_MODES = {"profile_velocity": Mode.PROFILE_VELOCITY, "velocity": Mode.VELOCITY}
+"""Modes for driving by their name in a profile."""
+
+
+def parse_tpdo1(data: bytes) -> tuple[int, int, int] | None:
+    """Statusword, position in qc and current in mA; None where the length is wrong."""
+    return TPDO1.unpack(data) if len(data) == TPDO1_BYTES else None
+
+
+def make_rpdo1(controlword: int, target_rpm: int) -> bytes:
+    """Controlword and target speed of the driving mode."""
+    return RPDO1.pack(controlword, target_rpm)
+
+
+def make_rpdo3(controlword: int, mode: int) -> bytes:
+    """Controlword and mode of operation."""
+    return RPDO3.pack(controlword, mode)

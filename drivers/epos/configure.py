@@ -1,0 +1,178 @@
+"""What a profile means for the objects of an EPOS 24/5, and the steps that write it and prove it."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+
+from canhelm.errors import Refused
+from drivers.canopen.configuration import Configuration
+from drivers.canopen.device import Step
+from drivers.canopen.pdo import AT_ONCE, ON_SYNC, Settings, rpdo_settings, tpdo_settings
+from drivers.canopen.sdo import SdoClient
+from drivers.epos.codec import DRIVING_MODES, RPDO1_MAPS, TPDO1_MAP
+from drivers.epos.codes import EMERGENCIES
+from drivers.epos.objects import OBJECTS
+from drivers.epos.outputs import OutputBits
+from drivers.epos.state_machine import Command, state_of
+from drivers.epos.units import WheelUnits
+from profiles.schema import DriveConfig, Network
+
+DEVICE_TYPE = 0x0002_0192
+VENDOR_MAXON = 0xFB
+HARDWARE_24_5, HARDWARE_MASK = 0x6210, 0xFFF0
+OLDEST_FIRMWARE = 0x2010
+"""Before it the digital outputs and the RS-232 protocol were different (Firmware Specification 15.4)."""
+MOTOR_TYPES = {"brushed_dc": 1, "brushless_sine": 10, "brushless_block": 11}
+OVERSPEED_MARGIN = 1.2
+
+ZERO_TARGETS: Settings = [
+    (OBJECTS["target_velocity"], 0),
+    (OBJECTS["velocity_mode_setting_value"], 0),
+    (OBJECTS["current_mode_setting_value"], 0),
+]
+"""A drive keeps its last target over a restart of its master, and would follow it when it is enabled."""
+
+
+def pdo_plan(config: DriveConfig) -> Settings:
+    """COB-IDs, transmission types and mappings; unused PDOs too, because at factory settings all belong to node 1."""
+    node, rpdo1_map = config.node, RPDO1_MAPS[DRIVING_MODES[config.mode]]
+    return [
+        *rpdo_settings(OBJECTS, 1, node, ON_SYNC, rpdo1_map),
+        *rpdo_settings(OBJECTS, 2, node, AT_ONCE),
+        *rpdo_settings(OBJECTS, 3, node, AT_ONCE),
+        *tpdo_settings(OBJECTS, 1, node, ON_SYNC, TPDO1_MAP),
+        *tpdo_settings(OBJECTS, 2, node, AT_ONCE),
+        *tpdo_settings(OBJECTS, 3, node, AT_ONCE),
+    ]
+
+
+def parameter_plan(config: DriveConfig) -> Settings:
+    """Limits, ramps and motor data of the profile in the drive's units."""
+    units = WheelUnits.of(config)
+    top_rpm = math.ceil(config.max_speed_m_s * abs(units.rpm_per_m_s))
+    ramp_rpm_s = units.ramp_rpm_s(config.acceleration_m_s2)
+    by_name = {
+        "profile_acceleration": ramp_rpm_s,
+        "profile_deceleration": ramp_rpm_s,
+        "quick_stop_deceleration": units.ramp_rpm_s(config.quick_stop_m_s2),
+        "max_profile_velocity": top_rpm,
+        "max_following_error": config.max_following_error_qc,
+        "continuous_current_limit": round(1e3 * config.continuous_current_a),
+        "output_current_limit": round(1e3 * config.output_current_a),
+        "pole_pairs": config.motor.pole_pairs,
+        "max_speed_in_current_mode": round(OVERSPEED_MARGIN * top_rpm),
+        "thermal_time_constant_winding": round(10 * config.motor.thermal_time_constant_s),
+    }
+    return [(OBJECTS[name], value) for name, value in by_name.items()]
+
+
+def guarding_plan(network: Network) -> Settings:
+    """Life guarding; it begins with the first request (Firmware Specification 14.1.6, 14.1.7)."""
+    return [
+        (OBJECTS["guard_time"], network.guard_time_ms),
+        (OBJECTS["life_time_factor"], network.life_time_factor),
+    ]
+
+
+class EposSetup:
+    """One attempt to configure one drive, in pre-operational.
+
+    Args:
+        config: the drive in the profile.
+        network: timing.
+        sdo: the node's client.
+        who: the node for people.
+        outputs: its digital outputs, which carry the brakes.
+    """
+
+    def __init__(self, config: DriveConfig, network: Network, sdo: SdoClient, who: str, outputs: OutputBits) -> None:
+        self._config = config
+        self._network = network
+        self._sdo = sdo
+        self._who = who
+        self._outputs = outputs
+        self._written = Configuration(sdo, who)
+
+    def steps(self) -> tuple[Step, ...]:
+        """The steps in their order."""
+        return (
+            Step("checking its identity", self._check_identity),
+            Step("stopping it", self._stop),
+            Step("clearing its errors", self._clear_errors),
+            Step("setting up guarding", self._write_guarding),
+            Step("mapping its PDOs", self._write_pdos),
+            Step("writing its limits and ramps", self._write_parameters),
+            Step("setting up its brake output", self._write_outputs),
+            Step("writing zero targets", self._write_zero_targets),
+            Step("setting its mode of operation", self._write_mode),
+            Step("reading everything back", self._written.verify),
+        )
+
+    async def _check_identity(self) -> None:
+        expect, other = self._written.expect, "check the node ids: another kind of device stands on this one"
+        await expect(OBJECTS["device_type"], DEVICE_TYPE, other)
+        await expect(OBJECTS["vendor_id"], VENDOR_MAXON, other)
+        await expect(OBJECTS["hardware_version"], HARDWARE_24_5, other, HARDWARE_MASK)
+        firmware = await self._sdo.read_int(OBJECTS["software_version"])
+        if firmware < OLDEST_FIRMWARE:
+            raise Refused(
+                f"{self._who}: 0x2003/1 (software_version) is 0x{firmware:04X}, not 0x{OLDEST_FIRMWARE:04X} or later",
+                node=self._sdo.node,
+                object="0x2003/1",
+                value=firmware,
+                limit=OLDEST_FIRMWARE,
+                remedy="update the drive's firmware",
+            )
+
+    async def _stop(self) -> None:
+        """Life guarding off while nobody guards; a drive that still turns is brought to rest by its ramp, then off."""
+        await self._written.write(((OBJECTS["life_time_factor"], 0), (OBJECTS["guard_time"], 0)))
+        state = state_of(await self._sdo.read_int(OBJECTS["statusword"]))
+        if state is not None and state.power_stage_on:
+            await self._sdo.write(OBJECTS["controlword"], Command.QUICK_STOP)
+            await asyncio.sleep(self._config.max_speed_m_s / self._config.quick_stop_m_s2)
+        await self._sdo.write(OBJECTS["controlword"], Command.DISABLE_VOLTAGE)
+
+    async def _clear_errors(self) -> None:
+        await self._sdo.write(OBJECTS["controlword"], Command.FAULT_RESET)
+        await self._sdo.write(OBJECTS["controlword"], Command.DISABLE_VOLTAGE)
+        await self._sdo.write(OBJECTS["number_of_recorded_errors"], 0)
+
+    async def _write_guarding(self) -> None:
+        await self._written.write(guarding_plan(self._network))
+
+    async def _write_pdos(self) -> None:
+        await self._written.write(pdo_plan(self._config))
+
+    async def _write_parameters(self) -> None:
+        await self._written.write(parameter_plan(self._config))
+        pulses = OBJECTS["encoder_pulses_per_turn"]
+        if await self._sdo.read_int(pulses) != self._config.encoder_pulses_per_turn:
+            await self._written.write([(pulses, self._config.encoder_pulses_per_turn)])
+            await self._clear_errors()  # the change of a sensor parameter raises 0x7320
+        remedy = (
+            "write it, save it with 0x1010/1, and switch the drive off and on: the motor type counts from its start"
+        )
+        await self._written.expect(OBJECTS["motor_type"], MOTOR_TYPES[self._config.motor.type], remedy)
+
+    async def _write_outputs(self) -> None:
+        await self._outputs.set_up(self._written)
+
+    async def _write_zero_targets(self) -> None:
+        await self._written.write(ZERO_TARGETS)
+
+    async def _write_mode(self) -> None:
+        mode = DRIVING_MODES[self._config.mode]
+        await self._written.write([(OBJECTS["mode_of_operation"], mode)])
+        await self._written.expect(
+            OBJECTS["mode_of_operation_display"], mode, "switch the drive off and on; see 0x6502 for its modes"
+        )
+
+
+def emergency_words(code: int) -> tuple[str, str]:
+    """What an emergency code of the drive says, and its cure."""
+    known = EMERGENCIES.get(code)
+    if known is None:
+        return f"emergency 0x{code:04X}", f"`canhelm explain 0x{code:04X}`"
+    return f"{known.name} (0x{code:04X}): {known.meaning}", known.cure

@@ -1,0 +1,386 @@
+"""One EPOS 24/5 with its wheel: cyclic readings and targets, device control, faults."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable
+from typing import Any
+
+from canhelm.errors import CanhelmError, DeviceFault, NotReady, Refused, Timeout
+from drivers.canopen.device import CanopenDevice, Step
+from drivers.canopen.master import Master
+from drivers.canopen.pdo import rpdo_cob_id, tpdo_cob_id
+from drivers.contract import DriveState, Fault, NodeState
+from drivers.epos import moves
+from drivers.epos.codec import DRIVING_MODES, RPDO1, TPDO1, TPDO1_BYTES, make_rpdo3
+from drivers.epos.configure import ZERO_TARGETS, EposSetup, emergency_words
+from drivers.epos.objects import OBJECTS
+from drivers.epos.outputs import OutputBits
+from drivers.epos.state_machine import Command, Mode, State, controlword_to, state_of
+from drivers.epos.transitions import StatuswordWaiters
+from drivers.epos.units import WheelUnits
+from profiles.schema import DriveConfig
+
+NEW_REFERENCE_SPEEDS = 3.0
+NEW_REFERENCE_QC = 1000
+"""A position that differs from the last by more than this, beyond what three times the top speed makes in that time, is
+no travel but a new reference (homing, restart)."""
+_HALF_TURN, _FULL_TURN = 1 << 31, (1 << 32) - 1
+
+_FAULTS = (State.FAULT, State.FAULT_REACTION_DISABLED, State.FAULT_REACTION_ENABLED)
+_DRIVE_STATES: dict[State | None, DriveState] = {
+    **dict.fromkeys(_FAULTS, DriveState.FAULT),
+    State.START: DriveState.DISABLED,
+    State.NOT_READY_TO_SWITCH_ON: DriveState.DISABLED,
+    State.SWITCH_ON_DISABLED: DriveState.DISABLED,
+    State.READY_TO_SWITCH_ON: DriveState.ENABLING,
+    State.SWITCHED_ON: DriveState.ENABLING,
+    State.REFRESH: DriveState.ENABLING,
+    State.MEASURE_INIT: DriveState.ENABLING,
+    State.OPERATION_ENABLED: DriveState.ENABLED,
+    State.QUICK_STOP_ACTIVE: DriveState.QUICK_STOP,
+    None: DriveState.UNKNOWN,
+}
+_unpack_tpdo1, _pack_rpdo1 = TPDO1.unpack, RPDO1.pack
+
+
+class EposDrive(CanopenDevice):
+    """One drive; fulfils ``drivers.contract.Drive``.
+
+    Controlword and target speed go out together in RPDO1 each cycle, so both are commanded by storing them; a non-zero
+    target is sent only while the drive reports Operation Enabled in its driving mode.
+
+    Args:
+        master: the master of its bus.
+        name: its name in the profile.
+        config: its part of the profile.
+
+    Attributes:
+        speed_m_s: rim speed over the last two intervals between readings: position difference by time difference.
+        current_a: motor current, with the sign it has at the motor; :meth:`set_current` likewise.
+        statusword: last one received.
+        outputs: its digital outputs.
+        waiters: everybody who waits for a statusword of it.
+        on_ready_change: called with True when it has become ready, False when it was lost.
+    """
+
+    kind = "epos24_5"
+
+    def __init__(self, master: Master, name: str, config: DriveConfig) -> None:
+        super().__init__(master, name, config.node)
+        self.config = config
+        self.state = DriveState.UNKNOWN
+        self.position_m = self.speed_m_s = self.current_a = self.target_speed_m_s = 0.0
+        self.statusword = 0
+        self.mode = self.driving_mode = DRIVING_MODES[config.mode]
+        self.outputs = OutputBits(self.sdo)
+        self.on_ready_change: list[Callable[[bool], None]] = []
+        self._units = units = WheelUnits.of(config)
+        self._fastest_qc_s = NEW_REFERENCE_SPEEDS * config.max_speed_m_s / abs(units.m_per_qc)
+        self._raw_qc = self._qc = self._qc_before = 0
+        self._before_s = -math.inf
+        self._target_rpm = 0
+        self._controlword = int(Command.DISABLE_VOLTAGE)
+        self._rpdo1, self._rpdo3 = rpdo_cob_id(1, config.node), rpdo_cob_id(3, config.node)
+        self._send = master.bus.send
+        self._period_s = 1.0 / master.network.cycle_hz
+        self._turn = asyncio.Lock()
+        self._stops = 0
+        self.waiters = StatuswordWaiters(self.who, config.node)
+        master.subscribe(tpdo_cob_id(1, config.node), self._on_tpdo1)
+
+    # --- cyclic --------------------------------------------------------------------------------------------------
+
+    def _on_tpdo1(self, can_id: int, data: bytes, timestamp: float) -> None:
+        if len(data) != TPDO1_BYTES:
+            self.master.counters.malformed += 1
+            return
+        statusword, raw_qc, current_ma = _unpack_tpdo1(data)
+        moved_qc = ((raw_qc - self._raw_qc + _HALF_TURN) & _FULL_TURN) - _HALF_TURN
+        self._raw_qc = raw_qc
+        last_s = self.reading_time_s
+        if abs(moved_qc) > NEW_REFERENCE_QC + self._fastest_qc_s * (timestamp - last_s) or last_s == -math.inf:
+            moved_qc, self._qc_before, last_s = 0, self._qc, -math.inf
+        qc = self._qc + moved_qc
+        span_s = timestamp - self._before_s
+        if span_s > 0.0:
+            self.speed_m_s = (qc - self._qc_before) * self._units.m_per_qc / span_s
+        self._qc_before, self._before_s = self._qc, last_s
+        self._qc, self.reading_time_s = qc, timestamp
+        self.position_m = qc * self._units.m_per_qc
+        self.current_a = current_ma * 1e-3
+        if statusword != self.statusword or self.state is DriveState.UNKNOWN:
+            self._on_statusword(statusword)
+        if self.waiters:
+            self.waiters.take(statusword)
+        if self.on_reading is not None:
+            self.on_reading(self.node)
+
+    def command_speed(self, speed_m_s: float) -> None:
+        """Take a target speed at the rim for the next :meth:`transmit`; zero unless enabled in the driving mode."""
+        top = self.config.max_speed_m_s
+        if self.state is not DriveState.ENABLED or self.mode is not self.driving_mode or speed_m_s != speed_m_s:
+            speed_m_s = 0.0
+        self.target_speed_m_s = speed_m_s = min(max(speed_m_s, -top), top)
+        self._target_rpm = round(speed_m_s * self._units.rpm_per_m_s)
+
+    def transmit(self, deadline_s: float) -> None:
+        """Send controlword and target of this cycle."""
+        if self.node_state is NodeState.READY:
+            self._send(self._rpdo1, _pack_rpdo1(self._controlword, self._target_rpm), deadline_s)
+
+    def _command(self, controlword: int) -> None:
+        """Send a controlword now; it counts at the next SYNC and is repeated by each cycle."""
+        self._controlword = controlword
+        self.transmit(asyncio.get_running_loop().time() + self._period_s)
+
+    def _drop_target(self) -> None:
+        self.target_speed_m_s = 0.0
+        self._target_rpm = 0
+
+    # --- states --------------------------------------------------------------------------------------------------
+
+    def _on_statusword(self, statusword: int) -> None:
+        self.statusword = statusword
+        before, self.state = self.state, _DRIVE_STATES[state_of(statusword)]
+        if self.state is before:
+            return
+        if self.state is DriveState.FAULT:
+            self._stand_down()
+            if self.fault is None:
+                message = f"{self.who} is in fault (statusword 0x{statusword:04X})"
+                self.fault = self.make_fault(0, message, "read its error history 0x1003/1, then reset the fault")
+        elif before is DriveState.ENABLED and self._controlword & 0xF == Command.ENABLE_OPERATION:
+            self._stand_down()
+            message = f"{self.who} left operation enabled by itself (statusword 0x{statusword:04X})"
+            self.fault = self.make_fault(0, message, "check its digital inputs and its supply, then reset")
+
+    def _stand_down(self) -> None:
+        """From now on command nothing that could move the drive."""
+        self._drop_target()
+        self._controlword = int(Command.DISABLE_VOLTAGE)
+
+    def _interrupt(self, error: CanhelmError) -> None:
+        """End every transition that is on its way."""
+        self._stops += 1
+        self.waiters.interrupt(error)
+
+    async def _walk_to(self, target: State, stops: int) -> None:
+        while (state := state_of(self.statusword)) is not target:
+            if self.state is DriveState.FAULT:
+                raise self.device_fault()
+            if stops != self._stops:
+                raise Refused(f"{self.who} was stopped in the meantime", node=self.node, remedy="enable it again")
+            controlword = None if state is None else controlword_to(target, state)
+            if controlword is not None:
+                self._command(controlword)
+            await self._leave(state, target)
+
+    async def _leave(self, state: State | None, target: State) -> None:
+        await self.waiters.reach(lambda statusword: state_of(statusword) is not state, target.words, target)
+
+    # --- commands ------------------------------------------------------------------------------------------------
+
+    async def enable(self) -> None:
+        """Write a zero target, take the drive to Operation Enabled in its driving mode; returns when it is there.
+
+        Raises:
+            NotReady: the node is not configured, started and guarded.
+            DeviceFault: it is in fault, or the mode was not taken.
+            Timeout: it did not get there; the message says where it stands and which bit is missing.
+            Refused: a stop came in between.
+        """
+        self.require_ready()
+        if self.state is DriveState.FAULT:
+            raise self.device_fault()
+        async with self._turn:
+            stops = self._stops
+            try:
+                await self.enter_mode(self.driving_mode)
+                await self._walk_to(State.OPERATION_ENABLED, stops)
+            except (CanhelmError, asyncio.CancelledError):
+                if stops == self._stops and self.node_state is NodeState.READY:
+                    self._command(Command.DISABLE_VOLTAGE)
+                raise
+
+    async def disable(self) -> None:
+        """Switch the power stage off and return when it is off; the axis then coasts. Raises NotReady or Timeout."""
+        self.require_ready()
+        self._interrupt(Refused(f"{self.who} was disabled in the meantime", node=self.node))
+        self._drop_target()
+        self._command(Command.DISABLE_VOLTAGE)
+        off = (DriveState.DISABLED, DriveState.FAULT)
+        if self.state not in off:
+            await self.waiters.reach(
+                lambda statusword: _DRIVE_STATES[state_of(statusword)] in off,
+                "power stage off",
+                State.SWITCH_ON_DISABLED,
+            )
+
+    def quick_stop(self) -> None:
+        """Command the quick stop at once by RPDO3; RPDO1 follows, so that no cycle enables the drive again."""
+        self._interrupt(Refused(f"{self.who} was stopped in the meantime", node=self.node, remedy="enable it again"))
+        self._drop_target()
+        self._controlword = int(Command.QUICK_STOP)
+        if self.node_state is NodeState.READY:
+            soon_s = asyncio.get_running_loop().time() + self._period_s
+            self._send(self._rpdo3, make_rpdo3(Command.QUICK_STOP, self.mode), soon_s)
+            self.transmit(soon_s)
+
+    async def reset_fault(self) -> None:
+        """Clear a fault by a rising edge of the fault reset bit.
+
+        Raises:
+            NotReady: the node is not ready.
+            DeviceFault: the drive stays in fault: the cause is still there.
+        """
+        self.require_ready()
+        async with self._turn:
+            if self.state is DriveState.FAULT:
+                await self._reset_edge()
+        self.fault = None
+
+    async def _reset_edge(self) -> None:
+        self._command(Command.DISABLE_VOLTAGE)
+        readings = iter((False, True))
+        await self.waiters.reach(lambda _: next(readings), "a cycle with the fault reset bit clear")
+        self._command(Command.FAULT_RESET)
+        try:
+            await self.waiters.reach(lambda statusword: state_of(statusword) not in _FAULTS, "the end of its fault")
+        except Timeout:
+            raise self.device_fault() from None
+        finally:
+            self._command(Command.DISABLE_VOLTAGE)
+
+    def device_fault(self) -> DeviceFault:
+        """The drive's fault as an error."""
+        fault = self.fault or self.make_fault(0, f"{self.who} is in fault", "reset the fault")
+        remedy = fault.remedy or "reset the fault"
+        return DeviceFault(fault.message, node=self.node, value=fault.code or None, remedy=remedy)
+
+    # --- modes ---------------------------------------------------------------------------------------------------
+
+    async def enter_mode(self, mode: Mode) -> None:
+        """Write zero targets, then the mode, and prove it. Raises DeviceFault where the drive does not take it."""
+        self._drop_target()
+        await self.write(*ZERO_TARGETS)
+        if self.state is DriveState.ENABLED:
+            self._command(Command.ENABLE_OPERATION)
+        await self.write((OBJECTS["mode_of_operation"], mode))
+        found = await self.sdo.read_int(OBJECTS["mode_of_operation_display"])
+        if found != mode:
+            raise DeviceFault(
+                f"{self.who} stays in mode {found} instead of {int(mode)} ({mode.words})",
+                node=self.node,
+                object="0x6061",
+                value=found,
+                limit=int(mode),
+                remedy="try again at rest; switch the drive off and on if that does not help",
+            )
+        self.mode = mode
+
+    async def write(self, *settings: tuple[Any, int]) -> None:
+        """Write objects in their order. Raises NodeAbsent, Timeout or Aborted."""
+        for entry, value in settings:
+            await self.sdo.write(entry, value)
+
+    def require_enabled(self) -> None:
+        """Raise NotReady unless the drive is in Operation Enabled."""
+        self.require_ready()
+        if self.state is not DriveState.ENABLED:
+            raise NotReady(f"{self.who} is {self.state}", node=self.node, remedy=f"`canhelm motor enable {self.name}`")
+
+    async def use_driving_mode(self) -> None:
+        """Back to the mode of the profile, with a zero target. Raises NotReady, DeviceFault, NodeAbsent or Aborted."""
+        self.require_ready()
+        self._drop_target()
+        if self.mode is not self.driving_mode:
+            async with self._turn:
+                await self.enter_mode(self.driving_mode)
+
+    async def set_current(self, current_a: float) -> None:
+        """See :func:`drivers.epos.moves.set_current`."""
+        async with self._turn:
+            await moves.set_current(self, current_a)
+
+    async def move_to(self, position_qc: int, *, relative: bool, speed_rpm: float) -> None:
+        """See :func:`drivers.epos.moves.move_to`."""
+        async with self._turn:
+            await moves.move_to(self, position_qc, relative, speed_rpm, self._command)
+
+    async def home(self, method: int) -> None:
+        """See :func:`drivers.epos.moves.home`."""
+        async with self._turn:
+            await moves.home(self, method, self._command)
+
+    @property
+    def at_target(self) -> bool:
+        """True when the last move or homing reached its target."""
+        return moves.at_target(self.mode, self.statusword)
+
+    def rpm_from_speed(self, speed_m_s: float) -> float:
+        """Motor speed in rpm for a rim speed."""
+        return speed_m_s * self._units.rpm_per_m_s
+
+    def speed_from_rpm(self, speed_rpm: float) -> float:
+        """Rim speed for a motor speed in rpm."""
+        return speed_rpm / self._units.rpm_per_m_s
+
+    # --- boot-up -------------------------------------------------------------------------------------------------
+
+    def boot_steps(self) -> tuple[Step, ...]:
+        """Configuration in pre-operational; see :class:`drivers.epos.configure.EposSetup`."""
+        return EposSetup(self.config, self.master.network, self.sdo, self.who, self.outputs).steps()
+
+    def start_steps(self) -> tuple[Step, ...]:
+        """Its first reading proves that PDO mapping and SYNC work."""
+        self.reading_time_s = self._before_s = -math.inf
+        return (Step("waiting for its first reading (TPDO1 after SYNC)", self._first_reading),)
+
+    async def _first_reading(self) -> None:
+        await self.waiters.reach(lambda _: True, "its first reading")
+
+    def on_ready(self) -> None:
+        """Configured: in its driving mode, disabled, all targets zero; a fault is gone unless it still shows it."""
+        self.mode = self.driving_mode
+        self._stand_down()
+        if self.state is not DriveState.FAULT:
+            self.fault = None
+        for changed in self.on_ready_change:
+            changed(True)
+
+    def on_lost(self, fault: Fault) -> None:
+        """Nothing is known of it any more, and nothing is commanded."""
+        self._stand_down()
+        self.state = DriveState.UNKNOWN
+        self.speed_m_s = self.current_a = 0.0
+        self._interrupt(NotReady(fault.message, node=self.node, remedy=fault.remedy))
+        for changed in self.on_ready_change:
+            changed(False)
+
+    def on_emcy(self, code: int, register: int, vendor: bytes) -> Fault | None:
+        """An emergency: the drive reacts by itself; here it is put into words."""
+        if code == 0:
+            return None
+        meaning, cure = emergency_words(code)
+        self.fault = self.make_fault(code, f"{self.who} reports {meaning}", cure)
+        return self.fault
+
+    async def before_close(self) -> None:
+        """End life guarding of a drive that is off, so that it does not report its master lost."""
+        if self.state is DriveState.DISABLED:
+            await self.write((OBJECTS["life_time_factor"], 0))
+
+    def status(self) -> dict[str, Any]:
+        """Everything about the drive; speeds also at the motor."""
+        return super().status() | {
+            "state": str(self.state),
+            "mode": self.mode.words,
+            "statusword": f"0x{self.statusword:04X}",
+            "velocity_rpm": round(self.rpm_from_speed(self.speed_m_s), 1),
+            "speed_m_s": round(self.speed_m_s, 4),
+            "target_speed_m_s": round(self.target_speed_m_s, 4),
+            "position_m": round(self.position_m, 5),
+            "current_a": round(self.current_a, 3),
+        }
