@@ -1,0 +1,120 @@
+"""A robot's network in one process: drives, encoders and brakes of a profile on a simulated bus, and the physics."""
+
+from __future__ import annotations
+
+import asyncio
+from functools import partial
+from random import Random
+
+from drivers.simulated.brake import SimulatedBrake
+from drivers.simulated.bus import SimulatedBus
+from drivers.simulated.encoder import SimulatedEncoder
+from drivers.simulated.epos import SimulatedEpos
+from drivers.simulated.max2d import Max2dWorld
+from drivers.simulated.node import SimulatedNode
+from profiles.schema import BrakeConfig, Profile
+
+_BOOT_DELAY_S = (0.05, 0.15)
+"""Shortest and longest time from power-up to the boot-up message (assumed)."""
+_WATCH_S = 0.01
+"""Longest time that moving things are left unobserved."""
+
+
+class SimulatedNetwork:
+    """Everything behind the bus, without power at first.
+
+    The world is integrated when somebody looks, and at least every 10 ms while a power stage is on or anything moves,
+    so that drives notice faults in time. At rest it costs nothing.
+
+    Args:
+        profile: a robot with a simulation section.
+        medium: the bus to join.
+        seed: of boot delays, measurement noise and the physics' start.
+
+    Attributes:
+        world: the truth, for tests.
+        drives, encoders, brakes: the twins by their names in the profile.
+
+    Raises:
+        ConfigError: the profile cannot be simulated.
+    """
+
+    def __init__(self, profile: Profile, medium: SimulatedBus, seed: int) -> None:
+        random = Random(seed)
+        self.world = Max2dWorld(profile, seed)
+        self.drives = {
+            name: SimulatedEpos(
+                medium.port(name),
+                config,
+                self.world.axes[name],
+                self.world,
+                random.uniform(*_BOOT_DELAY_S),
+                random.getrandbits(32),
+            )
+            for name, config in profile.drives.items()
+        }
+        self.encoders = {
+            name: SimulatedEncoder(medium.port(name), config, name, self.world, random.uniform(*_BOOT_DELAY_S))
+            for name, config in profile.encoders.items()
+        }
+        self.brakes = {name: self._brake(name, config) for name, config in profile.brakes.items()}
+        self._watch: asyncio.TimerHandle | None = None
+        for drive in self.drives.values():
+            drive.on_power_stage = self._on_power_stage
+
+    def _brake(self, name: str, config: BrakeConfig) -> SimulatedBrake:
+        brake = SimulatedBrake(config, partial(self._move_brake, name))
+        self.drives[config.drive].outputs.connect(config.output, brake.set_coil)
+        return brake
+
+    def node(self, which: int | str) -> SimulatedNode:
+        """A node by its id or its name. Raises KeyError where there is none."""
+        nodes: dict[str, SimulatedNode] = {**self.drives, **self.encoders}
+        if isinstance(which, str) and which in nodes:
+            return nodes[which]
+        return {node.node_id: node for node in nodes.values()}[int(which)]
+
+    def power_on(self, which: int | str = "all") -> None:
+        """Switch on one node, by id or name, or all; each boots after its own delay."""
+        for node in self._nodes(which):
+            node.power_on()
+
+    def power_off(self, which: int | str = "all") -> None:
+        """Switch off one node, by id or name, or all, at once."""
+        for node in self._nodes(which):
+            node.power_off()
+
+    def _nodes(self, which: int | str) -> list[SimulatedNode]:
+        return [*self.drives.values(), *self.encoders.values()] if which == "all" else [self.node(which)]
+
+    async def close(self) -> None:
+        """Switch everything off and leave the bus."""
+        self.power_off()
+        for node in self._nodes("all"):
+            await node.port.close()
+        for brake in self.brakes.values():
+            brake.close()
+        if self._watch is not None:
+            self._watch.cancel()
+            self._watch = None
+
+    # Physics
+
+    def _move_brake(self, name: str, engaged: bool) -> None:
+        self.world.advance(asyncio.get_running_loop().time())
+        self.world.set_brake(name, engaged)
+        self._wake()
+
+    def _on_power_stage(self, on: bool) -> None:
+        if on:
+            self._wake()
+
+    def _wake(self) -> None:
+        if self._watch is None:
+            self._watch = asyncio.get_running_loop().call_later(_WATCH_S, self._look)
+
+    def _look(self) -> None:
+        self._watch = None
+        self.world.advance(asyncio.get_running_loop().time())
+        if self.world.moving or any(drive.motion.powered for drive in self.drives.values()):
+            self._wake()
