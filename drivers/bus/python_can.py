@@ -1,0 +1,302 @@
+"""Any interface that python-can knows, on the running loop: SocketCAN, slcan, vendor adapters.
+
+Frames come through a file descriptor on the loop where the interface has one, else through one reader thread. Frames
+that the interface has no room for wait here, most urgent first, until they fit or their deadline passes. An interface
+that goes down is opened again as soon as it is back.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import errno
+import logging
+import math
+import threading
+import time
+from heapq import heapify, heappop, heappush
+from pathlib import PurePath
+
+import can
+
+from canhelm.errors import BusOff, UsageError
+from drivers.bus.contract import ID_MASK, RTR_FLAG, Bus
+from drivers.bus.wire_time import LoadMeter, frame_bits
+
+LOGGER = logging.getLogger("canhelm.bus")
+
+QUEUE_DEPTH = 64
+RETRY_S = 0.001
+REOPEN_S = 1.0
+READER_TIMEOUT_S = 0.1
+SERIAL_SEND_TIMEOUT_S = 0.01
+"""Longest time that a serial adapter may hold up the loop; SocketCAN never does."""
+
+_GONE = {errno.ENETDOWN, errno.ENODEV, errno.ENXIO, errno.EIO, errno.EBADF}
+_ERROR_CLASS_BUS_OFF = 0x40  # linux/can/error.h
+
+_Queued = tuple[int, int, int, bytes, float]
+"""Priority on the wire, order of queueing, identifier with flags, data, deadline."""
+
+
+def open_bus(spec: str, bit_rate: int) -> PythonCanBus:
+    """The bus that a specification names; it is opened by its :meth:`~PythonCanBus.open`.
+
+    Args:
+        spec: ``INTERFACE:CHANNEL``, for instance ``socketcan:can0`` or ``slcan:/dev/ttyUSB0``.
+        bit_rate: bit/s; interfaces that the system configures (SocketCAN) keep theirs.
+
+    Raises:
+        UsageError: the specification is not of that form, or python-can has no such interface.
+    """
+    interface, colon, channel = spec.partition(":")
+    if not (interface and colon and channel):
+        raise UsageError(f"{spec!r} names no bus", value=spec, remedy="give INTERFACE:CHANNEL, such as socketcan:can0")
+    if interface not in can.VALID_INTERFACES:
+        known = ", ".join(sorted(can.VALID_INTERFACES))
+        raise UsageError(f"there is no CAN interface {interface!r}", value=spec, remedy=f"use one of {known}")
+    return PythonCanBus(interface, channel, bit_rate)
+
+
+class PythonCanBus(Bus):
+    """One interface of python-can.
+
+    Attributes:
+        interface: python-can's name of the kind of interface.
+        channel: which one.
+        down: why the interface does not work at the moment; None while it does.
+        error_frames: error frames that the controller reported.
+        foreign: frames that are no classic base frames, and garbage of the adapter.
+    """
+
+    def __init__(self, interface: str, channel: str, bit_rate: int) -> None:
+        super().__init__(PurePath(channel).name, bit_rate)
+        self.interface = interface
+        self.channel = channel
+        self.down: str | None = None
+        self.error_frames = 0
+        self.foreign = 0
+        self._send_timeout_s = 0.0 if interface == "socketcan" else SERIAL_SEND_TIMEOUT_S
+        self._meter = LoadMeter(bit_rate)
+        self._link: can.BusABC | None = None
+        self._fd: int | None = None
+        self._reader: threading.Thread | None = None
+        self._pending: list[_Queued] = []
+        self._order = 0
+        self._retry: asyncio.TimerHandle | None = None
+        self._reopening: asyncio.Task[None] | None = None
+
+    async def open(self) -> None:
+        """Open the interface on the running loop. Raises BusOff where it is down or missing."""
+        self._loop = asyncio.get_running_loop()
+        await self._connect()
+
+    async def close(self) -> None:
+        """Close the interface; what is still queued is dropped."""
+        if self._reopening is not None:
+            self._reopening.cancel()
+            self._reopening = None
+        link = self._disconnect()
+        if link is not None:
+            await asyncio.to_thread(self._shut_down, link)
+
+    def load(self) -> float:
+        """Share of the last second that the frames seen here kept the wire busy, 0 to 1."""
+        return self._meter.load(self._loop.time())
+
+    def send(self, can_id: int, data: bytes = b"", deadline_s: float = math.inf) -> None:
+        """Send one frame or queue it; see :meth:`Bus.send`. Raises ValueError for what no base frame can be."""
+        frame_bits(can_id, data)
+        if not self._pending and self._transmit(can_id, data):
+            return
+        if self._link is None:
+            self.counters.dropped_stale += 1
+            return
+        if len(self._pending) >= QUEUE_DEPTH:
+            self._drop_stale()
+        if len(self._pending) >= QUEUE_DEPTH:
+            self.counters.dropped_full += 1
+            return
+        self._order += 1
+        priority = (can_id & ID_MASK) << 1 | (can_id & RTR_FLAG != 0)
+        heappush(self._pending, (priority, self._order, can_id, data, deadline_s))
+        if self._retry is None:
+            self._retry = self._loop.call_later(RETRY_S, self._send_pending)
+
+    def _transmit(self, can_id: int, data: bytes) -> bool:
+        """Hand a frame to the interface; False where it has no room for it or is gone."""
+        if self._link is None:
+            return False
+        remote = bool(can_id & RTR_FLAG)
+        message = can.Message(
+            arbitration_id=can_id & ID_MASK, is_extended_id=False, is_remote_frame=remote, data=None if remote else data
+        )
+        try:
+            self._link.send(message, timeout=self._send_timeout_s)
+        except (can.CanError, OSError) as error:
+            if _error_number(error) in _GONE:
+                self._lose(error)
+            return False
+        self.counters.sent += 1
+        self._show(can_id, data, self._loop.time())
+        return True
+
+    def _send_pending(self) -> None:
+        self._retry = None
+        self._drop_stale()
+        while self._pending and self._transmit(self._pending[0][2], self._pending[0][3]):
+            heappop(self._pending)
+        if self._pending:
+            self._retry = self._loop.call_later(RETRY_S, self._send_pending)
+
+    def _drop_stale(self) -> None:
+        now = self._loop.time()
+        wanted = [queued for queued in self._pending if queued[4] >= now]
+        self.counters.dropped_stale += len(self._pending) - len(wanted)
+        heapify(wanted)
+        self._pending = wanted
+
+    def _on_readable(self) -> None:
+        try:
+            self._receive_all()
+        except (can.CanError, OSError) as error:
+            self._lose(error)
+
+    def _receive_all(self) -> None:
+        while self._link is not None:
+            try:
+                message = self._link.recv(0)
+            except ValueError:  # an adapter's line that is none
+                self.foreign += 1
+                continue
+            if message is None:
+                return
+            self._take(message)
+
+    def _read_until_closed(self, link: can.BusABC) -> None:
+        """The reader thread of an interface without a file descriptor."""
+        while self._link is link:
+            try:
+                message = link.recv(READER_TIMEOUT_S)
+            except (can.CanError, OSError) as error:
+                if self._link is link:
+                    self._loop.call_soon_threadsafe(self._lose, error)
+                return
+            if message is not None:
+                self._loop.call_soon_threadsafe(self._take, message)
+
+    def _take(self, message: can.Message) -> None:
+        if self._link is None:
+            return  # read just before the interface was closed
+        if message.is_error_frame:
+            self._take_error(message)
+        elif message.is_extended_id or message.is_fd:
+            self.foreign += 1
+        else:
+            remote = message.is_remote_frame
+            can_id = message.arbitration_id | RTR_FLAG if remote else message.arbitration_id
+            data = b"" if remote else bytes(message.data)
+            stamp = self._loop_time(message.timestamp)
+            self.down = None
+            self.counters.received += 1
+            self._show(can_id, data, stamp)
+            if self.receiver is not None:
+                self.receiver(can_id, data, stamp)
+
+    def _take_error(self, message: can.Message) -> None:
+        self.error_frames += 1
+        if message.arbitration_id & _ERROR_CLASS_BUS_OFF and self.down is None:
+            self.down = "bus-off"
+            LOGGER.error("%s is bus-off (%s)", self.name, "check wiring, termination and bit rate; " + self._remedy())
+
+    def _loop_time(self, wall_s: float) -> float:
+        """The loop's time of a wall-clock stamp less than a second old; now for interfaces with clocks of their own."""
+        now = self._loop.time()
+        age_s = time.time() - wall_s
+        return now - age_s if 0.0 <= age_s < 1.0 else now
+
+    def _show(self, can_id: int, data: bytes, stamp: float) -> None:
+        self._meter.add(stamp, frame_bits(can_id, data))
+        for tap in tuple(self.taps):
+            tap(can_id, data, stamp)
+
+    async def _connect(self) -> None:
+        try:
+            link = await asyncio.to_thread(self._open_link)
+        except (can.CanError, OSError, ValueError) as error:
+            raise self._bus_off(error) from error
+        self._link = link
+        try:
+            self._listen(link)
+        except (can.CanError, OSError) as error:
+            self._disconnect()
+            await asyncio.to_thread(self._shut_down, link)
+            raise self._bus_off(error) from error
+        self.down = None
+
+    def _open_link(self) -> can.BusABC:
+        return can.Bus(channel=self.channel, interface=self.interface, bitrate=self.bit_rate, ignore_config=True)
+
+    def _listen(self, link: can.BusABC) -> None:
+        """Begin to receive; an interface that is down says so at the first reading."""
+        try:
+            self._fd = link.fileno()
+        except NotImplementedError:
+            self._reader = threading.Thread(target=self._read_until_closed, args=(link,), daemon=True, name=self.name)
+            self._reader.start()
+        else:
+            self._receive_all()
+            self._loop.add_reader(self._fd, self._on_readable)
+
+    def _disconnect(self) -> can.BusABC | None:
+        """Stop sending and receiving; the link that is to be shut down."""
+        link, self._link = self._link, None
+        if self._fd is not None:
+            self._loop.remove_reader(self._fd)
+            self._fd = None
+        if self._retry is not None:
+            self._retry.cancel()
+            self._retry = None
+        self.counters.dropped_stale += len(self._pending)
+        self._pending = []
+        return link
+
+    def _shut_down(self, link: can.BusABC) -> None:
+        """In a thread of its own: wait for the reader, then close, which talks to a serial adapter."""
+        if self._reader is not None:
+            self._reader.join()
+            self._reader = None
+        with contextlib.suppress(can.CanError, OSError):
+            link.shutdown()
+
+    def _lose(self, error: Exception) -> None:
+        link = self._disconnect()
+        if link is not None:
+            self.down = str(error)
+            LOGGER.error("%s", self._bus_off(error))
+            self._reopening = self._loop.create_task(self._reopen(link))
+
+    async def _reopen(self, link: can.BusABC) -> None:
+        await asyncio.to_thread(self._shut_down, link)
+        while self._link is None:
+            await asyncio.sleep(REOPEN_S)
+            with contextlib.suppress(BusOff):
+                await self._connect()
+        LOGGER.info("%s is back", self.name)
+
+    def _bus_off(self, error: Exception) -> BusOff:
+        return BusOff(f"{self.interface} interface {self.channel} is down or missing: {error}", remedy=self._remedy())
+
+    def _remedy(self) -> str:
+        if self.interface != "socketcan":
+            return (
+                "is the adapter plugged in, may this user open it, and are its driver and python-can extra installed?"
+            )
+        if self.channel.startswith("vcan"):
+            return f"sudo ip link add dev {self.channel} type vcan; sudo ip link set {self.channel} up"
+        return f"sudo ip link set {self.channel} up type can bitrate {self.bit_rate} restart-ms 100"
+
+
+def _error_number(error: Exception) -> int | None:
+    number = error.error_code if isinstance(error, can.CanError) else getattr(error, "errno", None)
+    return number if isinstance(number, int) else None
