@@ -110,6 +110,21 @@ class Max2dWorld:
         return vx, vy, self._yaw_rate
 
     @property
+    def slip_ratio(self) -> tuple[float, ...]:
+        """True slip ratios of wheels 1 to 4: (rim speed - rolling speed) over the faster of the two."""
+        return tuple(wheel.contact.slip_ratio for wheel in self.wheels.values())
+
+    @property
+    def slip_angle_rad(self) -> tuple[float, ...]:
+        """True slip angles of wheels 1 to 4, positive where the contact point drifts to the left of its heading."""
+        return tuple(wheel.contact.slip_angle_rad for wheel in self.wheels.values())
+
+    @property
+    def force_n(self) -> tuple[tuple[float, float], ...]:
+        """Forces of the floor on wheels 1 to 4, along and to the left of their headings."""
+        return tuple((wheel.contact.force_x_n, wheel.contact.force_y_n) for wheel in self.wheels.values())
+
+    @property
     def max_slip_ratio(self) -> float:
         """Largest slip ratio of any wheel, without sign, since the last ``reset_statistics``."""
         return max(wheel.contact.max_slip_ratio for wheel in self.wheels.values())
@@ -143,19 +158,18 @@ class Max2dWorld:
             self._origin_s = now_s
         steps = int((now_s - self._origin_s) / self._step_s + 1e-6)
         while self._steps_done < steps:
-            if self._ask_sources():
+            if self._a_demand_changes():
                 self._quiet_steps = 0
-            elif self._quiet_steps >= REST_STEPS:
+            if self._quiet_steps < REST_STEPS:
+                self._step()
+                self._watch_for_rest()
+            elif all(axis.torque_source is None for axis in self.axes.values()):
                 self._steps_done = steps
                 return
-            self._step()
             self._steps_done += 1
-            self._quiet_steps = self._quiet_steps + 1 if self._is_slow() else 0
-            if self._quiet_steps == REST_STEPS:
-                self._come_to_rest()
 
-    def _ask_sources(self) -> bool:
-        """Ask every drive for its demand; True when one of them changed."""
+    def _a_demand_changes(self) -> bool:
+        """Ask every drive for its demand in the coming step; True when one differs from the last."""
         step = self._step_s
         changed = False
         for drive in self._drives:
@@ -214,6 +228,15 @@ class Max2dWorld:
         c, s = self._cos, self._sin
         return self._world_vx * c + self._world_vy * s, self._world_vy * c - self._world_vx * s
 
+    def _watch_for_rest(self) -> None:
+        """Count the steps at rest; after enough of them take the last imperceptible motion away."""
+        if not self._is_slow():
+            self._quiet_steps = 0
+            return
+        self._quiet_steps += 1
+        if self._quiet_steps == REST_STEPS:
+            self._come_to_rest()
+
     def _is_slow(self) -> bool:
         """Whether nothing moves faster than what counts as rest."""
         if not (-REST_SPEED < self._world_vx < REST_SPEED and -REST_SPEED < self._world_vy < REST_SPEED):
@@ -222,7 +245,7 @@ class Max2dWorld:
         return all(-REST_SPEED < motion < REST_SPEED for motion in motions)
 
     def _come_to_rest(self) -> None:
-        """Take the last imperceptible motion away."""
+        """Set every speed to zero."""
         self._world_vx = self._world_vy = self._yaw_rate = 0.0
         self._rear.rate_rad_s = self._front.rate_rad_s = 0.0
         for drive in self._drives:

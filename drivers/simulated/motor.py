@@ -69,7 +69,7 @@ class WheelDrive:
         self._back_loss = 1.0 / config.gear_efficiency - 1.0
 
     def ask(self, dt_s: float) -> bool:
-        """Ask the torque source for its demand; True when it differs from the last one."""
+        """Ask the torque source for its demand in the coming step; True when it differs from the last one."""
         axis = self.axis
         source = axis.torque_source
         demand = 0.0 if source is None else source.current_demand(axis.speed_rad_s, axis.position_rad, dt_s)

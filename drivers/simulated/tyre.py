@@ -66,13 +66,13 @@ class Contact:
         self.slip_ratio = 0.0
         """(rim speed - rolling speed) over the faster of the two."""
         self.slip_tangent = 0.0
-        """Lateral over rolling speed of the contact point, without sign."""
+        """Velocity of the contact point to the left of the heading, over its rolling speed."""
         self.max_slip_ratio = 0.0
         self.max_slip_tangent = 0.0
 
     @property
     def slip_angle_rad(self) -> float:
-        """Angle between the wheel's heading and the motion of its contact point, without sign."""
+        """Angle from the wheel's heading to the motion of its contact point, positive to the left."""
         return atan(self.slip_tangent)
 
     def deform(self, rim_m_s: float, roll_m_s: float, lateral_m_s: float, load_n: float, dt_s: float) -> None:
@@ -115,13 +115,15 @@ class Contact:
         rolling = roll_m_s if roll_m_s >= 0.0 else -roll_m_s
         if rolling < SLOWEST_REFERENCE_M_S:
             rolling = SLOWEST_REFERENCE_M_S
-        tangent = (lateral_m_s if lateral_m_s >= 0.0 else -lateral_m_s) / rolling
+        tangent = lateral_m_s / rolling
         rim = rim_m_s if rim_m_s >= 0.0 else -rim_m_s
         ratio = (rim_m_s - roll_m_s) / (rim if rim > rolling else rolling)
         self.slip_ratio = ratio
         self.slip_tangent = tangent
         if ratio < 0.0:
             ratio = -ratio
+        if tangent < 0.0:
+            tangent = -tangent
         if ratio > self.max_slip_ratio:
             self.max_slip_ratio = ratio
         if tangent > self.max_slip_tangent:

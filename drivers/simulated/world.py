@@ -19,8 +19,7 @@ class TorqueSource(Protocol):
     def current_demand(self, speed_rad_s: float, position_rad: float, dt_s: float) -> float:
         """Demand of motor current [A] for the coming step.
 
-        Asked once a step while anything moves or any demand changes. A world at rest whose sources all repeat their
-        demand asks once an ``advance`` only.
+        Asked exactly once a step, moving or not, so a source may integrate ramps, regulators and temperatures in it.
 
         Args:
             speed_rad_s: speed of the motor shaft.
@@ -45,6 +44,7 @@ class Axis:
         self.current_a = 0.0
         """Current that flows in the motor."""
         self.torque_source: TorqueSource | None = None
+        """None costs nothing: a world at rest without any source skips time in one go."""
 
 
 class World(Protocol):
@@ -55,13 +55,14 @@ class World(Protocol):
 
     @property
     def moving(self) -> bool:
-        """False while everything is at rest and every torque source repeats its demand."""
+        """False while everything is at rest and every torque source repeats its demand, as far as advanced."""
         ...
 
     def advance(self, now_s: float) -> None:
         """Integrate up to ``now_s`` in fixed steps; the first call sets the origin of time.
 
-        The result depends on the times only, not on the number of calls. Rest is skipped in one go.
+        The result depends on the times only, not on the number of calls. Rest without a torque source is skipped in
+        one go; rest with sources only asks them.
         """
         ...
 

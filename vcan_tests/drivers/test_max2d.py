@@ -171,13 +171,21 @@ class Counting(SpeedSource):
         return super().current_demand(speed_rad_s, position_rad, dt_s)
 
 
-def test_rest_is_skipped_in_one_go() -> None:
+def test_a_torque_source_is_asked_once_a_step_even_at_rest() -> None:
     world = Max2dWorld(PROFILE)
     source = Counting(PROFILE.drives["rear_left"])
     world.axes["rear_left"].torque_source = source
     world.advance(0.0)
-    world.advance(3600.0)
-    assert source.calls == 1
+    world.advance(1.0)
+    assert not world.moving
+    assert source.calls == 1000
+
+
+def test_rest_without_power_is_skipped_in_one_go() -> None:
+    world = Max2dWorld(PROFILE)
+    world.advance(0.0)
+    world.advance(1e8)
+    assert world.pose == (0.0, 0.0, 0.0)
 
 
 def test_a_new_demand_wakes_the_world_at_the_step_it_was_made() -> None:
@@ -198,6 +206,22 @@ def test_equal_seeds_make_equal_worlds() -> None:
     first, second, other = (Max2dWorld(PROFILE, seed=seed) for seed in (7, 7, 8))
     shafts = [[axis.position_rad for axis in world.axes.values()] for world in (first, second, other)]
     assert shafts[0] == shafts[1] != shafts[2]
+
+
+def test_a_wheel_that_drifts_left_has_a_positive_slip_angle_and_a_force_to_the_right() -> None:
+    robot = Robot(headings=(-0.2, -0.2))
+    robot.speed_up(*[0.5] * 4)
+    robot.world.set_heading("front", -0.3)
+    robot.roll(*[0.5] * 4, for_s=0.02)
+    front_left = 2
+    assert robot.world.slip_angle_rad[front_left] > 0.02
+    assert robot.world.force_n[front_left][1] < -1.0
+
+
+def test_a_spinning_wheel_has_a_positive_slip_ratio() -> None:
+    robot = Robot(with_tyre(friction=0.1))
+    robot.roll(2.0, 0.0, 0.0, 0.0, for_s=0.2)
+    assert robot.world.slip_ratio[0] > 0.1
 
 
 def test_slip_statistics_start_anew() -> None:
