@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import math
+from typing import Final
+
+ARRIVED_M: Final = 1e-9
+"""What remains of a way when it is covered, rounding apart."""
 
 
 def ramp(speed: float, wanted: float, acceleration: float, dt: float) -> float:
@@ -14,9 +18,9 @@ def ramp(speed: float, wanted: float, acceleration: float, dt: float) -> float:
 def speed_to_end(speed: float, limit: float, acceleration: float, remaining: float, dt: float) -> float:
     """The speed to hold for the next ``dt`` on the way to an end point where the motion rests.
 
-    The remaining way that a staircase of speeds with steps ``a dt`` needs from speed v to rest is
-    v^2 / (2 a) + v dt / 2; solved for v, with the last step cut to what remains, the sum of ``speed * dt`` is the
-    way exactly.
+    Braking from v is a staircase v, v - s, v - 2 s, ... with s = a dt. Its n + 1 steps cover
+    dt ((n + 1) v - s n (n + 1) / 2); solved for v with the n whose staircase just fits into the remaining way, the sum
+    of ``speed * dt`` is the way exactly.
 
     Args:
         speed: the speed of the last step [m/s], signed.
@@ -25,10 +29,13 @@ def speed_to_end(speed: float, limit: float, acceleration: float, remaining: flo
         remaining: way to go [m], signed.
         dt: length of a step [s].
     """
-    half_step = acceleration * dt / 2
-    braking = math.sqrt(half_step * half_step + 2 * acceleration * abs(remaining)) - half_step
-    wanted = math.copysign(min(limit, braking, abs(remaining) / dt), remaining)
-    return ramp(speed, wanted, acceleration, dt)
+    if abs(remaining) < ARRIVED_M:
+        return ramp(speed, 0.0, acceleration, dt)
+    stair = acceleration * dt
+    single_step = abs(remaining) / dt
+    n = math.floor((math.sqrt(1 + 8 * single_step / stair) - 1) / 2)
+    braking = single_step / (n + 1) + stair * n / 2
+    return ramp(speed, math.copysign(min(limit, braking), remaining), acceleration, dt)
 
 
 def approach_speed(error: float, gain: float, deceleration: float) -> float:

@@ -28,9 +28,9 @@ from daemon.loops.geometry import (
     solve_turning,
 )
 from daemon.loops.measurement import Command, Measurement
-from daemon.loops.motion_profile import ramp, speed_to_end
+from daemon.loops.motion_profile import ARRIVED_M, ramp, speed_to_end
 from daemon.loops.paired_steer_target import PairedSteerTarget, check_target, turning_warnings
-from daemon.loops.steering import REST_SPEED_M_S, PairSteering, SteeringPhase
+from daemon.loops.steering import REST_SPEED_M_S, SETTLE_TIME_S, PairSteering, SteeringPhase
 from profiles.schema import Limits, PairedSteerGeometry
 
 RESTEER_RAD: Final = math.radians(1.0)
@@ -42,7 +42,6 @@ WAIT_S: Final = 3.0
 MAX_TURNS: Final = 3
 """Times that one pair is turned for one motion before its heading counts as not holding."""
 
-_WAY_DONE_M: Final = 1e-9
 _STANDING: Final[PerWheel] = (0.0, 0.0, 0.0, 0.0)
 
 
@@ -120,8 +119,10 @@ class PairedSteerLaw:
         self._target: PairedSteerTarget | None = None
         self._phase = Phase.STOPPING
         self._in_phase_s = 0.0
+        self._at_rest_s = 0.0
         self._failure = ""
         self._pair: int | None = None
+        self._goal_rad: float | None = None
         self._turns = [0, 0]
         self._steering = PairSteering(geometry.contact_offset_m, limits)
         self._rim_speed_m_s = 0.0
@@ -163,7 +164,9 @@ class PairedSteerLaw:
         self._remaining_m = None
         if target is not None and target.distance_m is not None:
             self._remaining_m = math.copysign(target.distance_m, target.speed_m_s)
-        if self._pair is None:
+        if self._pair is not None:
+            self._redirect(self._pair)
+        else:
             self._enter(Phase.DRIVING if self._may_roll_on() else Phase.STOPPING)
         self._failure = ""
         self._check()
@@ -175,11 +178,18 @@ class PairedSteerLaw:
         except CanhelmError as refusal:
             self._fail(str(refusal))
 
+    def _redirect(self, pair: int) -> None:
+        """Let the pair that is being turned follow the new target, unless it is as good as the old one."""
+        wanted = self._wanted_heading(pair)
+        if wanted is None or self._goal_rad is None or not abs(wanted - self._goal_rad) <= self._threshold_rad():
+            self._goal_rad = wanted
+
     def _may_roll_on(self) -> bool:
         """Whether the new motion goes on from the rolling one without new headings."""
-        if self._failure or self._speed_m_s == 0 or self._held_rad is None:
+        if self._failure or self._held_rad is None:
             return False
-        return self._moves() and self._next_pair(self._held_rad) is None
+        rolling = self._phase is Phase.DRIVING or self._speed_m_s != 0
+        return rolling and self._moves() and self._next_pair(self._held_rad) is None
 
     def _moves(self) -> bool:
         return self._target is not None and self._target.moves and not self._finished
@@ -189,8 +199,11 @@ class PairedSteerLaw:
         return RESTEER_RAD if endless else self._tolerance_rad
 
     def _heading_error(self, heading_rad: tuple[float, ...], pair: int) -> float:
-        wanted = None if self._target is None else self._target.headings_rad[pair]
+        wanted = self._wanted_heading(pair)
         return 0.0 if wanted is None else wanted - heading_rad[pair]
+
+    def _wanted_heading(self, pair: int) -> float | None:
+        return None if self._target is None else self._target.headings_rad[pair]
 
     def _next_pair(self, heading_rad: tuple[float, ...]) -> int | None:
         """The pair to turn next, front before rear; a target that stands still forever turns none."""
@@ -202,7 +215,7 @@ class PairedSteerLaw:
     def _enter(self, phase: Phase) -> None:
         if phase is not self._phase:
             self._phase = phase
-            self._in_phase_s = 0.0
+            self._in_phase_s = self._at_rest_s = 0.0
 
     def _fail(self, reason: str) -> PerWheel:
         self._failure = reason
@@ -225,12 +238,15 @@ class PairedSteerLaw:
 
     def _stop(self, measurement: Measurement, dt: float) -> PerWheel:
         if self._speed_m_s != 0:
-            self._in_phase_s = 0.0
+            self._in_phase_s = self._at_rest_s = 0.0
             return self._rest(measurement, dt)
-        at_rest = all(abs(speed) <= REST_SPEED_M_S for speed in measurement.wheel_speed_m_s)
-        if not (at_rest and all(measurement.brake_engaged)):
-            return self._wait("the wheels do not come to rest" if not at_rest else self._not_engaged(measurement))
-        return self._from_rest(measurement)
+        resting = all(abs(speed) <= REST_SPEED_M_S for speed in measurement.wheel_speed_m_s)
+        self._at_rest_s = self._at_rest_s + dt if resting else 0.0
+        if not resting:
+            return self._wait("the wheels do not come to rest")
+        if not all(measurement.brake_engaged):
+            return self._wait(self._not_engaged(measurement))
+        return self._from_rest(measurement) if self._at_rest_s >= SETTLE_TIME_S else _STANDING
 
     def _wait(self, sentence: str) -> PerWheel:
         return _STANDING if self._in_phase_s <= WAIT_S else self._fail(f"{sentence} within {WAIT_S:g} s")
@@ -261,6 +277,7 @@ class PairedSteerLaw:
             )
         self._turns[pair] += 1
         self._pair = pair
+        self._goal_rad = self._wanted_heading(pair)
         self._steering = PairSteering(self._geometry.contact_offset_m, self._limits)
         self._enter(Phase.RELEASING_BRAKE)
         return _STANDING
@@ -282,8 +299,7 @@ class PairedSteerLaw:
             return self._fail(f"the steering brakes changed while the {PAIR_NAMES[pair]} pair turned")
         first, second = WHEELS_OF_PAIR[pair]
         speeds = (measurement.wheel_speed_m_s[first], measurement.wheel_speed_m_s[second])
-        wanted = None if self._target is None else self._target.headings_rad[pair]
-        record = self._steering.step(measurement.heading_rad[pair], wanted, speeds, dt)
+        record = self._steering.step(measurement.heading_rad[pair], self._goal_rad, speeds, dt)
         if record.phase is SteeringPhase.FAILED:
             return self._fail(f"{PAIR_NAMES[pair]}: {record.failure}")
         if record.phase is SteeringPhase.DONE:
@@ -330,7 +346,7 @@ class PairedSteerLaw:
             limit, way = abs(self._target.speed_m_s), self._remaining_m
             self._speed_m_s = speed_to_end(before, limit, self._acceleration_m_s2, way, dt)
             self._remaining_m = way - self._speed_m_s * dt
-            if self._speed_m_s == 0 and abs(self._remaining_m) < _WAY_DONE_M:
+            if self._speed_m_s == 0 and abs(self._remaining_m) < ARRIVED_M:
                 self._finished = True
                 self._enter(Phase.STOPPING)
         self._ramping = abs(self._speed_m_s - before) > self._acceleration_m_s2 * dt * (1 - 1e-9)

@@ -110,7 +110,7 @@ class PairSteering:
         self._without_progress_s += dt
         if not math.isfinite(error):
             self._fail("the steering encoder gives no heading; check its cable and its node")
-        elif distance < self._best_rad - self._tolerance_rad / 2:
+        elif distance < self._best_rad - self._tolerance_rad / 2 or self._speed_m_s * error < 0:
             self._best_rad = distance
             self._without_progress_s = 0.0
         elif distance > self._best_rad + WRONG_WAY_RAD:

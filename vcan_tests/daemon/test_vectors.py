@@ -101,7 +101,7 @@ def check_turning(case: Case) -> None:
 
 
 def check_published_program(motion: TurningSolution, speed: float, printed: Case, relative: float) -> None:
-    """The thesis' program ``turning`` sets its centre 0.1625 m beside that of the right wheels and never signs omega."""
+    """The thesis' program ``turning``: centre 0.1625 m beside that of the right wheels, omega unsigned."""
     assert motion.icr_right_m is not None
     centre = (motion.icr_right_m[0], motion.icr_right_m[1] + 0.1625)
     radii = [math.dist(centre, point) for point in motion.contact_m]
