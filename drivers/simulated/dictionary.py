@@ -146,6 +146,10 @@ class SimulatedDictionary:
         writable = (a for a, o in self.objects.items() if o.access is Access.RW and a not in self._volatile)
         self._stored = {address: self.values[address] for address in writable}
 
+    def commission(self, values: dict[str, Value]) -> None:
+        """Put values by name into the non-volatile memory, as somebody who set the device up left them."""
+        self._stored |= {self.address(name): value for name, value in values.items()}
+
     def forget(self) -> None:
         """Empty the non-volatile memory: the next restart finds the factory values."""
         self._stored = {}

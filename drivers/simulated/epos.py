@@ -12,8 +12,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from math import floor, pi, tau
-from random import Random
 
 from drivers.epos.codes import EMERGENCIES, HOMING_METHODS, MOTOR_TYPES
 from drivers.epos.objects import OBJECTS
@@ -22,57 +20,14 @@ from drivers.simulated.bus import SimulatedPort
 from drivers.simulated.dictionary import LOAD, OUT_OF_RANGE, READ_ONLY, SdoAbort, SimulatedDictionary, Value
 from drivers.simulated.epos_homing import Homing
 from drivers.simulated.epos_io import NEGATIVE_LIMIT, DigitalInputs, DigitalOutputs
+from drivers.simulated.epos_measurements import Measurements
 from drivers.simulated.epos_motion import Motion
+from drivers.simulated.epos_settings import FACTORY, PARAMETERS, SET_VALUES, VOLATILE, Settings, commissioned
 from drivers.simulated.epos_state import DeviceControl
 from drivers.simulated.node import SimulatedNode, signature_check
 from drivers.simulated.world import Axis, World
 from profiles.schema import DriveConfig
 
-_FACTORY: dict[str, Value] = {
-    "product_code": 0x6210_2011,
-    "software_version": 0x2011,
-    "hardware_version": 0x6210,
-    "recompute_pdo_cob_ids_from_node_id": 1,
-    "continuous_current_limit": 5000,
-    "output_current_limit": 10000,
-}
-_VOLATILE = (
-    "number_of_recorded_errors",
-    "controlword",
-    "target_position",
-    "target_velocity",
-    "current_mode_setting_value",
-    "position_mode_setting_value",
-    "velocity_mode_setting_value",
-    "digital_output_functions_state",
-)
-_PARAMETERS = (
-    "encoder_pulses_per_turn",
-    "max_following_error",
-    "min_position_limit",
-    "max_position_limit",
-    "max_profile_velocity",
-    "profile_velocity",
-    "profile_acceleration",
-    "profile_deceleration",
-    "quick_stop_deceleration",
-    "homing_speed_switch_search",
-    "homing_speed_zero_search",
-    "homing_acceleration",
-    "current_threshold_for_homing",
-    "home_offset",
-    "home_position",
-    "continuous_current_limit",
-    "output_current_limit",
-    "max_speed_in_current_mode",
-    "thermal_time_constant_winding",
-)
-_SET_VALUES = (
-    "target_velocity",
-    "velocity_mode_setting_value",
-    "position_mode_setting_value",
-    "current_mode_setting_value",
-)
 _MODES = frozenset(
     (
         Mode.HOMING,
@@ -91,8 +46,6 @@ _LIFE_GUARDING = 0x8130
 _LIMIT_SWITCHES = (0xFF06, 0xFF07)
 _HALT, _MODE_START, _AT_ONCE, _RELATIVE = 1 << 8, 1 << 4, 1 << 5, 1 << 6
 _REFERENCED = 1 << 15
-_CURRENT_NOISE_MA = 4.0
-_HALL_PATTERNS = (0b001, 0b011, 0b010, 0b110, 0b100, 0b101)
 
 
 class SimulatedEpos(SimulatedNode):
@@ -117,7 +70,7 @@ class SimulatedEpos(SimulatedNode):
     def __init__(
         self, port: SimulatedPort, config: DriveConfig, axis: Axis, world: World, boot_delay_s: float, seed: int
     ) -> None:
-        dictionary = SimulatedDictionary(OBJECTS, config.node, _FACTORY, _VOLATILE)
+        dictionary = SimulatedDictionary(OBJECTS, config.node, FACTORY, VOLATILE)
         self.on_power_stage: Callable[[bool], None] = lambda _: None
         self.motion = Motion(config, axis, self.trigger_fault, self._ramp_ended)
         self.homing = Homing(self.motion)
@@ -125,16 +78,16 @@ class SimulatedEpos(SimulatedNode):
         self.control = DeviceControl(self)
         self.outputs = DigitalOutputs(dictionary, lambda: self.control.state is not State.FAULT)
         self._inputs = DigitalInputs(dictionary, self._limit_switch, self._capture)
-        self._config = config
+        self._settings = Settings(dictionary, self.motion, self.homing, config.encoder_pulses_per_turn)
+        self._measurements = Measurements(
+            self.motion, config.motor.pole_pairs, lambda: self._settings.rad_s_per_rpm, seed
+        )
         self._world = world
-        self._random = Random(seed)
-        self._captured_qc = 0
-        self._analog_mv = [0, 0]
         self._word = 0
         self._sensor = (0, 0)
         super().__init__(port, config.node, dictionary, receive_pdos=3, transmit_pdos=3, boot_delay_s=boot_delay_s)
-        self._describe_measurements()
-        self._describe_settings()
+        dictionary.commission(commissioned(config))
+        self._describe_objects_of_drive()
 
     # What tests may do to it
 
@@ -145,7 +98,7 @@ class SimulatedEpos(SimulatedNode):
 
     def set_analog_input(self, number: int, value_mv: int) -> None:
         """Apply a voltage [mV] to analog input 1 or 2."""
-        self._analog_mv[number - 1] = value_mv
+        self._measurements.analog_mv[number - 1] = value_mv
 
     def set_supply_voltage(self, voltage_v: float) -> None:
         """Change the supply voltage as the drive measures it; outside its range the drive faults until it is back."""
@@ -187,10 +140,10 @@ class SimulatedEpos(SimulatedNode):
         dictionary = self.dictionary
         self.motion.set_counts(0)
         self.homing.forget()
-        self._word = self._captured_qc = 0
-        self._sensor = self._sensor_setting()
-        self._take_parameters(0)
-        self._take_set_values(0)
+        self._word = self._measurements.captured_qc = 0
+        self._sensor = self._settings.sensor
+        self._settings.take_parameters()
+        self._settings.take_set_values()
         self.motion.change_mode(Mode(dictionary.number("mode_of_operation")))
         self.control.initialised()
         self._inputs.restart()
@@ -232,36 +185,16 @@ class SimulatedEpos(SimulatedNode):
 
     # Objects
 
-    def _describe_measurements(self) -> None:
-        motion, axis = self.motion, self.motion.axis
-        readers: dict[str, Callable[[], int]] = {
+    def _describe_objects_of_drive(self) -> None:
+        dictionary = self.dictionary
+        readers: dict[str, Callable[[], Value]] = {
+            **self._measurements.readers(),
             "statusword": self._statusword,
-            "mode_of_operation_display": lambda: int(motion.mode),
-            "position_actual_value": lambda: _wrapped(motion.counts),
-            "position_demand_value": lambda: _wrapped(round(motion.qc_of(motion.profile.position))),
-            "velocity_actual_value": lambda: round(axis.speed_rad_s / self._rad_s_per_rpm),
-            "velocity_actual_value_averaged": lambda: _int16(axis.speed_rad_s / self._rad_s_per_rpm),
-            "velocity_demand_value": lambda: round(motion.demand_speed / self._rad_s_per_rpm),
-            "velocity_sensor_actual_value": lambda: round(axis.speed_rad_s * motion.qc_per_rad),
-            "current_actual_value": self._current_ma,
-            "current_actual_value_averaged": lambda: _int16(1000.0 * axis.current_a),
-            "encoder_counter": lambda: motion.counts & 0xFFFF,
-            "encoder_counter_at_index": self._counter_at_index,
-            "hall_sensor_pattern": self._hall_pattern,
-            "system_state": lambda: 0b110 | motion.regulator.limited << 7,
-            "captured_position": lambda: _wrapped(self._captured_qc),
-            "analog_input_1": lambda: self._analog_mv[0],
-            "analog_input_2": lambda: self._analog_mv[1],
             "recompute_pdo_cob_ids_from_node_id": lambda: 1,
         }
-        for name, reader in readers.items():
-            self.dictionary.readers[self.dictionary.address(name)] = reader
-
-    def _describe_settings(self) -> None:
-        dictionary = self.dictionary
         actions: dict[str, Callable[[int], None]] = {
-            **dict.fromkeys(_PARAMETERS, self._take_parameters),
-            **dict.fromkeys(_SET_VALUES, self._take_set_values),
+            **dict.fromkeys(PARAMETERS, self._settings.take_parameters),
+            **dict.fromkeys(SET_VALUES, self._settings.take_set_values),
             "controlword": self._on_controlword,
             "mode_of_operation": lambda value: self.motion.change_mode(Mode(value)),
             "encoder_pulses_per_turn": self._on_sensor_changed,
@@ -275,45 +208,9 @@ class SimulatedEpos(SimulatedNode):
             "homing_method": _only(frozenset(HOMING_METHODS)),
             "motor_type": _only(frozenset(MOTOR_TYPES)),
         }
+        dictionary.readers |= {dictionary.address(name): reader for name, reader in readers.items()}
         dictionary.actions |= {dictionary.address(name): action for name, action in actions.items()}
         dictionary.checks |= {dictionary.address(name): check for name, check in checks.items()}
-
-    @property
-    def _rad_s_per_rpm(self) -> float:
-        """Shaft speed of what the drive takes for 1 rpm: it counts quad counts and trusts 0x2210/1."""
-        set_pulses = self.dictionary.number("encoder_pulses_per_turn")
-        return tau / 60.0 * set_pulses / self._config.encoder_pulses_per_turn
-
-    def _take_parameters(self, _: int) -> None:
-        number, rpm, motion = self.dictionary.number, self._rad_s_per_rpm, self.motion
-        parameters, homing, regulator = motion.parameters, self.homing.parameters, motion.regulator
-        parameters.profile_speed = number("profile_velocity") * rpm
-        parameters.max_speed = number("max_profile_velocity") * rpm
-        parameters.acceleration = number("profile_acceleration") * rpm
-        parameters.deceleration = number("profile_deceleration") * rpm
-        parameters.quick_stop = number("quick_stop_deceleration") * rpm
-        parameters.following_error_qc = number("max_following_error")
-        parameters.min_position_qc = number("min_position_limit")
-        parameters.max_position_qc = number("max_position_limit")
-        parameters.max_speed_in_current_mode = number("max_speed_in_current_mode") * rpm
-        homing.switch_speed = number("homing_speed_switch_search") * rpm
-        homing.zero_speed = number("homing_speed_zero_search") * rpm
-        homing.acceleration = number("homing_acceleration") * rpm
-        homing.threshold_a = 0.001 * number("current_threshold_for_homing")
-        homing.offset_qc = number("home_offset")
-        homing.home_position_qc = number("home_position")
-        regulator.continuous_a = 0.001 * number("continuous_current_limit")
-        regulator.output_a = 0.001 * number("output_current_limit")
-        regulator.winding_s = 0.1 * number("thermal_time_constant_winding")
-        motion.update()
-
-    def _take_set_values(self, _: int) -> None:
-        number, rpm, values = self.dictionary.number, self._rad_s_per_rpm, self.motion.set_values
-        values.target_velocity = number("target_velocity") * rpm
-        values.velocity = number("velocity_mode_setting_value") * rpm
-        values.position_qc = number("position_mode_setting_value")
-        values.current_a = 0.001 * number("current_mode_setting_value")
-        self.motion.update()
 
     def _on_controlword(self, word: int) -> None:
         rising = word & ~self._word
@@ -342,24 +239,9 @@ class SimulatedEpos(SimulatedNode):
         referenced = _REFERENCED if self.homing.referenced else 0
         return self.control.state | self.motion.status_bits() | referenced
 
-    def _current_ma(self) -> int:
-        return _int16(1000.0 * self.motion.axis.current_a + self._random.gauss(0.0, _CURRENT_NOISE_MA))
-
-    def _counter_at_index(self) -> int:
-        motion = self.motion
-        return floor(motion.qc_of(floor(motion.axis.position_rad / tau) * tau)) & 0xFFFF
-
-    def _hall_pattern(self) -> int:
-        electrical = self.motion.axis.position_rad * self._config.motor.pole_pairs
-        return _HALL_PATTERNS[floor(electrical / (pi / 3.0)) % 6]
-
-    def _sensor_setting(self) -> tuple[int, int]:
-        number = self.dictionary.number
-        return number("encoder_pulses_per_turn"), number("position_sensor_type")
-
     def _on_sensor_changed(self, _: int) -> None:
-        before, self._sensor = self._sensor, self._sensor_setting()
-        self._take_parameters(0)
+        before, self._sensor = self._sensor, self._settings.sensor
+        self._settings.take_parameters()
         if self._sensor != before:
             self.trigger_fault(_SENSOR)
 
@@ -374,16 +256,7 @@ class SimulatedEpos(SimulatedNode):
         self.trigger_fault(_LIMIT_SWITCHES[function - NEGATIVE_LIMIT])
 
     def _capture(self) -> None:
-        self._captured_qc = self.motion.counts
-
-
-def _wrapped(counts: int) -> int:
-    """Counts as the 32-bit register shows them."""
-    return (counts + 0x8000_0000) % 0x1_0000_0000 - 0x8000_0000
-
-
-def _int16(value: float) -> int:
-    return min(max(round(value), -0x8000), 0x7FFF)
+        self._measurements.captured_qc = self.motion.counts
 
 
 def _refuse(_: int) -> None:
