@@ -78,9 +78,10 @@ class VirtualTimeLoop(asyncio.BaseEventLoop):
         timers, ready = self._timers, self._ready
         while timers and (timers[0][0] <= self._now_s or not ready):
             when, _, handle = heapq.heappop(timers)
-            if not handle.cancelled():
+            if not handle._cancelled:
                 ready.append(handle)
-                self._now_s = max(self._now_s, when)
+                if when > self._now_s:
+                    self._now_s = when
         return bool(ready)
 
     def _write_to_self(self) -> None:

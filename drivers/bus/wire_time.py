@@ -109,7 +109,7 @@ class LoadMeter:
         self._recent_bits = 0
 
     def add(self, end_s: float, bits: int) -> None:
-        """Count a frame of ``bits`` that ended at ``end_s``; times must not decrease."""
+        """Count a frame of ``bits`` that ended at ``end_s``; frames come in the order of their times."""
         self.total_bits += bits
         self._recent_bits += bits
         self._recent.append((end_s, bits))

@@ -145,7 +145,8 @@ class SimulatedBus:
             port.attached = False
             self._ports.remove(port)
             self.forget_routes()
-            self._keep([queued for queued in self._queue if queued[6] is not port])
+            self._queue = [queued for queued in self._queue if queued[6] is not port]
+            heapify(self._queue)
             self._behind = deque(late for late in self._behind if late[1][6] is not port)
             port.queued = int(self._current is not None and self._current[6] is port)
 
@@ -160,7 +161,8 @@ class SimulatedBus:
         if not self._admits(port, now):
             return
         port.queued += 1
-        port.queue_high_water = max(port.queue_high_water, port.queued)
+        if port.queued > port.queue_high_water:
+            port.queue_high_water = port.queued
         self._order += 1
         priority = (can_id & ID_MASK) << 1 | (can_id & RTR_FLAG != 0)  # a data frame beats a remote one of its number
         queued = (priority, self._order, can_id, data, bits, deadline_s, port)
@@ -184,15 +186,12 @@ class SimulatedBus:
             stale = [queued for queued in self._queue if queued[6] is port and queued[5] < now_s]
             for queued in stale:
                 self._drop(queued)
-            self._keep([queued for queued in self._queue if queued not in stale])
-            if not stale:
-                port.counters.dropped_full += 1
-                return False
+                self._queue.remove(queued)
+            heapify(self._queue)
+        if port.queued >= port.depth:
+            port.counters.dropped_full += 1
+            return False
         return True
-
-    def _keep(self, queue: list[_Queued]) -> None:
-        heapify(queue)
-        self._queue = queue
 
     def _drop(self, queued: _Queued) -> None:
         port = queued[6]
