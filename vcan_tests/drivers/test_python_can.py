@@ -142,7 +142,7 @@ async def test_a_frame_keeps_the_time_at_which_it_came(links: list[ScriptedLink]
     bus.receiver = lambda can_id, data, stamp: stamps.append(stamp)
     links[0].far.send(b"181")
     await until_received(bus, 1)
-    assert asyncio.get_running_loop().time() - stamps[0] == pytest.approx(0.2, abs=0.1)
+    assert 0.19 < asyncio.get_running_loop().time() - stamps[0] < 1.0
     await bus.close()
 
 
