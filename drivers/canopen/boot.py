@@ -96,7 +96,7 @@ class NodeBoot:
             )
             await self._pause(FIRST_PAUSE_S)
         except _Restarted:
-            self._fail(NodeState.CONFIGURING, "rebooted", "warning", self._failed_step("it restarted"), "")
+            self._fail(NodeState.CONFIGURING, "waiting", "warning", self._failed_step("it restarted"), "")
         else:
             self._ready()
             await self._gone.wait()

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterable
 
 from canhelm.errors import Refused
 from drivers.canopen.objects import ObjectDef
 from drivers.canopen.sdo import SdoClient
+
+BREATH_S = 0.001
+"""Pause after each object: the identifiers of guarding have the lowest priority, and must get through all the same."""
+
+DIFFERS = "switch the device off and on; if it happens again, check its type and firmware"
 
 
 class Configuration:
@@ -30,6 +36,7 @@ class Configuration:
         for entry, value in settings:
             await self._sdo.write(entry, value)
             self.written[entry] = value
+            await asyncio.sleep(BREATH_S)
 
     async def expect(self, entry: ObjectDef, expected: int, remedy: str, mask: int = -1) -> None:
         """Read one object and compare it under a mask. Raises Refused where it differs."""
@@ -47,9 +54,8 @@ class Configuration:
     async def verify(self) -> None:
         """Read everything back that was written. Raises Refused at the first object that differs."""
         for entry, expected in self.written.items():
-            await self.expect(
-                entry, expected, "switch the device off and on; if it happens again, check its type and firmware"
-            )
+            await self.expect(entry, expected, DIFFERS)
+            await asyncio.sleep(BREATH_S)
 
 
 def _words(value: int) -> str:

@@ -11,7 +11,7 @@ from canhelm.errors import Aborted, NodeAbsent, Timeout
 from drivers.bus.contract import Bus, FrameHandler
 from drivers.canopen.codes import NmtCommand
 from drivers.canopen.counters import CanopenCounters
-from drivers.canopen.guarding import Guard
+from drivers.canopen.guarding import REPEAT_AFTER, Guard
 from drivers.canopen.nmt import NMT_COB_ID, SYNC_COB_ID, make_nmt
 from drivers.canopen.sdo import ANSWER_COB_ID, SdoClient
 from profiles.schema import Network
@@ -144,7 +144,8 @@ class Master:
         return guard
 
     def _send_guard_request(self, can_id: int) -> None:
-        self.bus.send(can_id, b"", asyncio.get_running_loop().time() + self._period_s)
+        deadline = asyncio.get_running_loop().time() + REPEAT_AFTER * self.network.guard_time_ms / 1e3
+        self.bus.send(can_id, b"", deadline)
 
     def guard_due(self, now_s: float) -> None:
         """Send the guard requests that are due and notice lost nodes; called by good control cycles only."""

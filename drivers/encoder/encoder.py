@@ -14,9 +14,9 @@ from drivers.contract import Fault
 from drivers.encoder.objects import OBJECTS, POSITION_ERROR
 from profiles.schema import EncoderConfig
 
-TPDO2 = struct.Struct("<I")
+POSITION = struct.Struct("<I")
 PROFILE_406, PROFILE_MASK = 0x0196, 0xFFFF
-_unpack_tpdo2 = TPDO2.unpack
+_unpack_position = POSITION.unpack
 
 
 def heading_of(counts: int, config: EncoderConfig) -> float:
@@ -49,19 +49,24 @@ class Cia406Encoder(CanopenDevice):
         self.config = config
         self.counts = config.zero_counts
         self.heading_rad = 0.0
+        master.subscribe(tpdo_cob_id(1, config.node), self._on_position)
         master.subscribe(tpdo_cob_id(2, config.node), self._on_tpdo2)
 
     def _on_tpdo2(self, can_id: int, data: bytes, timestamp: float) -> None:
-        if len(data) != 4:
+        self._on_position(can_id, data, timestamp)
+        if self.on_reading is not None:
+            self.on_reading(self.node)
+
+    def _on_position(self, can_id: int, data: bytes, timestamp: float) -> None:
+        """A position value in TPDO1 or TPDO2; an encoder sends TPDO1 once when it is started."""
+        if len(data) != POSITION.size:
             self.master.counters.malformed += 1
             return
-        (counts,) = _unpack_tpdo2(data)
+        (counts,) = _unpack_position(data)
         if counts != self.counts:
             self.counts = counts
             self.heading_rad = heading_of(counts, self.config)
         self.reading_time_s = timestamp
-        if self.on_reading is not None:
-            self.on_reading(self.node)
 
     async def preset_zero(self) -> int:
         """Make the present position heading 0 by the encoder's preset.

@@ -18,7 +18,7 @@ from drivers.epos.state_machine import Command, state_of
 from drivers.epos.units import WheelUnits
 from profiles.schema import DriveConfig, Network
 
-DEVICE_TYPE = 0x0002_0192
+DEVICE_TYPE = 0x0020_0192
 VENDOR_MAXON = 0xFB
 HARDWARE_24_5, HARDWARE_MASK = 0x6210, 0xFFF0
 OLDEST_FIRMWARE = 0x2010

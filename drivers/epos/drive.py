@@ -373,14 +373,14 @@ class EposDrive(CanopenDevice):
             await self.write((OBJECTS["life_time_factor"], 0))
 
     def status(self) -> dict[str, Any]:
-        """Everything about the drive; speeds also at the motor."""
+        """Everything about the drive; speeds also at the motor. Adding 0.0 turns -0.0 into 0.0."""
         return super().status() | {
             "state": str(self.state),
             "mode": self.mode.words,
             "statusword": f"0x{self.statusword:04X}",
-            "velocity_rpm": round(self.rpm_from_speed(self.speed_m_s), 1),
-            "speed_m_s": round(self.speed_m_s, 4),
-            "target_speed_m_s": round(self.target_speed_m_s, 4),
-            "position_m": round(self.position_m, 5),
-            "current_a": round(self.current_a, 3),
+            "velocity_rpm": round(self.rpm_from_speed(self.speed_m_s), 1) + 0.0,
+            "speed_m_s": round(self.speed_m_s, 4) + 0.0,
+            "target_speed_m_s": round(self.target_speed_m_s, 4) + 0.0,
+            "position_m": round(self.position_m, 5) + 0.0,
+            "current_a": round(self.current_a, 3) + 0.0,
         }

@@ -1,4 +1,4 @@
-"""Waiting for statuswords: futures that the cyclic readings resolve, and what to say when the wanted one does not come."""
+"""Waiting for statuswords: futures that cyclic readings resolve, and what to say when the wanted one does not come."""
 
 from __future__ import annotations
 
