@@ -1,8 +1,8 @@
 """What every CAN back end offers: the bus contract.
 
 A frame on the hot path is no object: it is ``(can_id, data, timestamp_s)``. ``can_id`` is the 11-bit identifier with
-the flags of SocketCAN above it (:data:`RTR_FLAG` for a remote frame, whose ``data`` is empty). Timestamps are seconds on
-the running loop's clock (``loop.time()``).
+the flags of SocketCAN above it (:data:`RTR_FLAG` for a remote frame, whose ``data`` is empty). Timestamps are seconds
+on the running loop's clock (``loop.time()``).
 """
 
 from __future__ import annotations
