@@ -17,9 +17,8 @@ from drivers.explain_codes import ABORTS, DICTIONARIES, Reading, code_reading, r
 _SdoReader = Callable[[str, bytes], Iterator[Reading]]
 """Title and the 8 bytes of an SDO frame -> readings."""
 
-_FRAME = re.compile(
-    r"(?P<id>[0-9A-Fa-f]{1,8})#(?:(?P<remote>[Rr][0-8]?)|(?P<data>(?:[0-9A-Fa-f]{2}){0,8}))(?:\.\.\.|…)?"
-)
+_FRAME = re.compile(r"(?P<id>[0-9A-F]{1,8})#((?P<remote>R[0-8]?)|(?P<data>([0-9A-F]{2}){0,8}))(\.\.\.|…)?", re.I | re.A)
+"""``181#3703`` or ``701#R`` as candump writes them; dots for what was left out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,9 +130,9 @@ def _unassigned(can_id: int) -> Reading:
 
 
 def _nmt_command(data: bytes) -> Reading:
-    command = NMT_COMMANDS.get(data[0]) if len(data) == 2 else None
+    command = NMT_COMMANDS.get(data[0]) if len(data) == 2 and data[1] <= 127 else None
     if command is None:
-        return Reading("frame", "NMT, malformed", "An NMT frame has a known command byte and a node: 2 bytes.")
+        return Reading("frame", "NMT, malformed", "An NMT frame has a known command byte and a node id, 0 for all.")
     target = f"node {data[1]}" if data[1] else "all nodes"
     return Reading("frame", f"NMT to {target}: {command.name}", command.meaning, source=command.source)
 
@@ -158,7 +157,8 @@ def _lss(_data: bytes) -> Reading:
 def _pdo(name: str, node: int, data: bytes) -> Iterator[Reading]:
     """One reading for each mapping of this length; a frame cut short is read as far as it goes."""
     maps = PDO_MAPS.get(name, ())
-    fitting = [pdo for pdo in maps if pdo.size == len(data)] or [pdo for pdo in maps if pdo.size > len(data)]
+    fitting = [pdo for pdo in maps if pdo.size == len(data)]
+    fitting = fitting or [pdo for pdo in maps if pdo.objects[0].type.bits <= 8 * len(data) < 8 * pdo.size]
     for pdo in fitting:
         yield _mapped(pdo, name, node, data)
     if not fitting:

@@ -93,10 +93,10 @@ def _table(rows: Sequence[dict[str, str]]) -> Table:
     from rich.table import Table
 
     table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
-    for column in ("object", "name", "of", "type", "access", "unit", "meaning"):
-        table.add_column(column, no_wrap=True)
+    for column in ("object", "name", "node_type", "type", "access", "unit"):
+        table.add_column(column.replace("node_type", "of"), no_wrap=True)
     for row in rows:
-        table.add_row(*row.values())
+        table.add_row(*(text for column, text in row.items() if column != "meaning"))
     return table
 
 

@@ -100,7 +100,7 @@ EMERGENCIES = _table(
         "Raise profile velocity or acceleration (0x6081, 0x6083), or shorten the way; then reset the fault.",
         register=0x20,
         reaction="Q",
-        source=_EMERGENCY,
+        source=_EMERGENCY + " (maxon's error map gives class D)",
     ),
     CodeDef(
         0x7320,

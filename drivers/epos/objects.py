@@ -171,7 +171,7 @@ _SYSTEM = (
               cure="Probe objects marked 'later' before using them."),
     ObjectDef(0x2003, 2, "hardware_version", _U16, _RO,
               "Hardware: 0x621x is an EPOS 24/5, 0x601x a 24/1, 0x641x a 70/10.", unit="hex",
-              cause="Not 0x62..: another drive with other current and voltage limits.",
+              cause="Not 0x621x: another drive with other current and voltage limits.",
               cure="Correct the profile, or exchange the drive."),
     ObjectDef(0x2003, 3, "application_number", _U16, _RO, "Number of a special application in the firmware."),
     ObjectDef(0x2003, 4, "application_version", _U16, _RO, "Version of that application."),
