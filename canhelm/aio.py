@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from types import TracebackType
 from typing import Any
 
@@ -92,7 +92,7 @@ class Client:
         finally:
             self._pending.pop(request, None)
 
-    async def notifications(self, rate_hz: float = 5.0) -> AsyncIterator[tuple[str, dict[str, Any]]]:
+    async def notifications(self, rate_hz: float = 5.0) -> AsyncGenerator[tuple[str, dict[str, Any]], None]:
         """Subscribe, and yield ("status", {...}) at that rate and ("event", {...}) as they come, without end."""
         await self.call("subscribe", rate_hz=rate_hz)
         while (notification := await self._notifications.get()) is not None:

@@ -55,8 +55,16 @@ def _finite(value: Any) -> Any:
 
 
 def make_request(request_id: int, method: str, params: dict[str, Any]) -> bytes:
-    """A request as a line."""
-    return make_message({"jsonrpc": "2.0", "id": request_id, "method": method, "params": params})
+    """A request as a line.
+
+    Raises:
+        UsageError: a parameter is NaN or infinite, or nothing that JSON can carry.
+    """
+    request = {"jsonrpc": "2.0", "id": request_id, "method": method, "params": params}
+    try:
+        return json.dumps(request, separators=(",", ":"), allow_nan=False).encode() + b"\n"
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"{method}: {error}", remedy="give finite numbers, strings, lists and mappings") from None
 
 
 def make_result(request_id: int | str | None, result: dict[str, Any]) -> bytes:

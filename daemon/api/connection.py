@@ -79,7 +79,11 @@ class Connection(asyncio.Protocol):
         self._peer = Peer.of(transport.get_extra_info("socket"))
         self._name = f"client {self._name.split()[-1]} (pid {self._peer.pid})"
         if not self._server.admit(self):
-            self._answer(None, protocol.INVALID_REQUEST, Refused("too many clients", remedy="close some"))
+            self._answer(
+                None,
+                protocol.INVALID_REQUEST,
+                Refused("too many clients", remedy="close other clients, and connect again"),
+            )
             self.end()
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -97,11 +101,16 @@ class Connection(asyncio.Protocol):
         if self._transport is not None:
             self._transport.close()
 
+    def abort(self) -> None:
+        """Hang up now, whatever is unsent."""
+        if self._transport is not None:
+            self._transport.abort()
+
     def _drop(self, reason: str) -> None:
         if self._transport is not None:
             LOGGER.warning("%s dropped: %s", self._name, reason)
             self._server.counters.dropped_clients += 1
-            self._transport.abort()
+            self.abort()
 
     def data_received(self, data: bytes) -> None:
         """Bytes came in; the lines in them are handled a few at a time."""

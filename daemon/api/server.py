@@ -127,14 +127,18 @@ class Server:
         """Hang up on everybody and take the socket away."""
         if self._server is None:
             return
-        self.backend.events.remove(self._on_event)
         self._server.close()
+        self._server = None
+        self.backend.events.remove(self._on_event)
         for connection in list(self.connections):
             connection.end()
         for task in list(self.tasks):
             task.cancel()
         if self.tasks:
             await asyncio.wait(list(self.tasks))
+        await asyncio.sleep(0)
+        for deaf in list(self.connections):
+            deaf.abort()
         self._remove_socket()
 
     def _remove_socket(self) -> None:
@@ -152,8 +156,8 @@ class Server:
         return Connection(self, crowded=len(self.connections) >= MAX_CLIENTS)
 
     def admit(self, connection: Connection) -> bool:
-        """Take a new connection in, unless there are too many even for stopping."""
-        if len(self.connections) >= MAX_CLIENTS + RESERVED_CLIENTS:
+        """Take a new connection in, unless there are too many even for stopping, or the server goes down."""
+        if self._server is None or len(self.connections) >= MAX_CLIENTS + RESERVED_CLIENTS:
             self.counters.dropped_clients += 1
             return False
         self.connections.add(connection)
@@ -183,12 +187,7 @@ def open_listener(path: Path) -> socket.socket:
     try:
         _own_folder(path.parent)
         _clear_stale(path)
-        listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        before = os.umask(0o117)
-        try:
-            listener.bind(os.fspath(path))
-        finally:
-            os.umask(before)
+        listener = _bind(path)
     except PermissionError as error:
         raise PermissionRefused(
             f"no socket can be opened at {path}: {error.strerror}", remedy="choose another place with --socket PATH"
@@ -199,6 +198,19 @@ def open_listener(path: Path) -> socket.socket:
             remedy="choose another place with --socket PATH (at most 107 characters)",
         ) from None
     _give_to_group(path)
+    return listener
+
+
+def _bind(path: Path) -> socket.socket:
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    before = os.umask(0o117)
+    try:
+        listener.bind(os.fspath(path))
+    except OSError:
+        listener.close()
+        raise
+    finally:
+        os.umask(before)
     return listener
 
 

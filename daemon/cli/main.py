@@ -28,38 +28,32 @@ NETWORK = Group("Network and devices", sort_key=3)
 SETUP = Group("Daemon and setup", sort_key=4)
 EXPERIMENTS = Group("Simulation and experiments", sort_key=5)
 
-COMMANDS: dict[Group, dict[str, tuple[str, str]]] = {
+COMMANDS: dict[Group, dict[str, str]] = {
     DRIVING: {
-        "stop": ("daemon.cli.stop:stop", "Stop everything now."),
-        "status": ("daemon.cli.status:status", "State at a glance."),
-        "steer": ("daemon.cli.steer:steer", "Turn a pair of wheels to a heading."),
-        "drive": ("daemon.cli.drive:app", "Drive the vehicle."),
-        "motor": ("daemon.cli.motor:app", "Enable, turn and stop one motor."),
-        "brake": ("daemon.cli.brake:app", "Engage, release and look at brakes."),
-        "estop": ("daemon.cli.stop:estop", "Emergency stop: quick stop, disable, latched until reset."),
-        "reset": ("daemon.cli.stop:reset", "Clear an emergency stop and faults."),
+        "stop": "daemon.cli.stop:stop",
+        "status": "daemon.cli.status:status",
+        "steer": "daemon.cli.steer:steer",
+        "drive": "daemon.cli.drive:app",
+        "motor": "daemon.cli.motor:app",
+        "brake": "daemon.cli.brake:app",
+        "estop": "daemon.cli.stop:estop",
+        "reset": "daemon.cli.stop:reset",
     },
     LOOKING: {
-        "monitor": ("daemon.cli.monitor:monitor", "Live screen."),
-        "doctor": ("daemon.cli.doctor:doctor", "What is wrong, each with the line that mends it."),
-        "explain": ("daemon.cli.explain:explain", "A code, an object or a frame in words, with cause and cure."),
+        "monitor": "daemon.cli.monitor:monitor",
+        "doctor": "daemon.cli.doctor:doctor",
+        "explain": "daemon.cli.explain:explain",
     },
-    NETWORK: {
-        "nmt": ("daemon.cli.nmt:app", "Network management commands to a node."),
-        "sdo": ("daemon.cli.sdo:app", "Read and write objects of a node."),
-        "object": ("daemon.cli.object:app", "The object dictionary."),
-    },
+    NETWORK: {"nmt": "daemon.cli.nmt:app", "sdo": "daemon.cli.sdo:app", "object": "daemon.cli.object:app"},
     SETUP: {
-        "run": ("daemon.cli.run:run", "The daemon in the foreground."),
-        "profile": ("daemon.cli.profile:app", "Profiles of robots."),
-        "version": ("daemon.cli.version:version", "Versions of canhelm and of what it stands on."),
-        "completion": ("daemon.cli.completion:completion", "Completion for bash, zsh and fish."),
+        "run": "daemon.cli.run:run",
+        "profile": "daemon.cli.profile:app",
+        "version": "daemon.cli.version:version",
+        "completion": "daemon.cli.completion:completion",
     },
-    EXPERIMENTS: {
-        "demo": ("daemon.cli.demo:demo", "Simulated network, daemon and the published manoeuvres in one process."),
-        "sim": ("daemon.cli.sim:app", "Do things to the simulated network."),
-    },
+    EXPERIMENTS: {"demo": "daemon.cli.demo:demo", "sim": "daemon.cli.sim:app"},
 }
+"""Commands by group, in the order of the help; module and function (or a noun's own app) of each."""
 
 
 class OptionEnv(Env):
@@ -84,8 +78,8 @@ def build_app() -> App:
         suppress_keyboard_interrupt=False,
     )
     for group, commands in COMMANDS.items():
-        for rank, (name, (path, text)) in enumerate(commands.items()):
-            app.command(path, name=name, help=text, group=group, sort_key=rank)
+        for rank, (name, path) in enumerate(commands.items()):
+            app.command(path, name=name, group=group, sort_key=rank)
     return app
 
 
@@ -118,5 +112,15 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: Sequence[str]) -> int:
-    result = build_app()(list(argv), exit_on_error=False, print_error=False, result_action="return_value")
+    app = build_app()
+    if not argv or argv[0] in app.help_flags:
+        _load_all(app)
+    result = app(list(argv), exit_on_error=False, print_error=False, result_action="return_value")
     return result if isinstance(result, int) else 0
+
+
+def _load_all(app: App) -> None:
+    """Load every command: the overview shows the first line of each one's own help."""
+    for commands in COMMANDS.values():
+        for name in commands:
+            app[name]

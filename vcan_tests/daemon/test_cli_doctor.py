@@ -1,0 +1,102 @@
+"""What the doctor finds, and the line that mends it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from daemon.cli.doctor import Finding, interface_finding, interface_findings, status_findings
+from daemon.cli.main import main
+
+READY = {"node": 1, "name": "rear_right", "node_state": "ready", "state": "disabled"}
+
+
+def interface(folder: Path, name: str = "can0", flags: str = "0x1", queue: str = "1000", kind: str = "280") -> Path:
+    where = folder / name
+    where.mkdir()
+    (where / "type").write_text(kind + "\n")
+    (where / "flags").write_text(flags + "\n")
+    (where / "tx_queue_len").write_text(queue + "\n")
+    return where
+
+
+def findings(**status: Any) -> dict[str, Finding]:
+    return {finding.check: finding for finding in status_findings({"state": "idle", **status})}
+
+
+def test_an_interface_that_is_down_is_brought_up(tmp_path: Path) -> None:
+    found = interface_finding("can0", interface(tmp_path, flags="0x0"), {"bitrate": 1_000_000})
+    assert (found.verdict, "ip link set can0 up type can bitrate" in found.mend) == ("problem", True)
+
+
+def test_a_virtual_interface_needs_no_bit_rate(tmp_path: Path) -> None:
+    found = interface_finding("vcan0", interface(tmp_path, "vcan0", flags="0x0"), {})
+    assert found.mend == "sudo ip link set vcan0 up"
+
+
+def test_bus_off_is_a_problem(tmp_path: Path) -> None:
+    found = interface_finding("can0", interface(tmp_path), {"bitrate": 500_000, "state": "BUS-OFF"})
+    assert (found.verdict, "termination" in found.mend) == ("problem", True)
+
+
+def test_a_short_queue_is_noted(tmp_path: Path) -> None:
+    found = interface_finding("can0", interface(tmp_path, queue="10"), {})
+    assert (found.verdict, "txqueuelen" in found.mend) == ("note", True)
+
+
+def test_an_interface_in_order_is_ok(tmp_path: Path) -> None:
+    found = interface_finding("can0", interface(tmp_path), {"bitrate": 1_000_000, "state": "ERROR-ACTIVE"})
+    assert (found.verdict, found.mend) == ("ok", "")
+
+
+def test_other_interfaces_are_left_out(tmp_path: Path) -> None:
+    interface(tmp_path, "eth0", kind="1")
+    assert [found.check for found in interface_findings(tmp_path)] == ["can"]
+
+
+def test_a_fault_names_its_remedy() -> None:
+    fault = {"message": "over-current", "remedy": "look for a short circuit"}
+    found = findings(nodes=[{**READY, "fault": fault}])["node 1 (rear_right)"]
+    assert (found.verdict, found.mend) == ("problem", "look for a short circuit")
+
+
+def test_a_node_that_is_waited_for_is_a_problem() -> None:
+    found = findings(nodes=[{**READY, "node_state": "absent", "status": "no boot-up"}])["node 1 (rear_right)"]
+    assert (found.verdict, found.finding) == ("problem", "no boot-up")
+
+
+def test_an_emergency_stop_is_a_problem() -> None:
+    assert findings(state="estop", message="emergency stop: by a person")["vehicle"].verdict == "problem"
+
+
+@pytest.mark.parametrize(("late", "verdict"), [(1, "ok"), (11, "problem")])
+def test_more_than_one_late_cycle_in_a_thousand_is_a_problem(late: int, verdict: str) -> None:
+    assert findings(cycle={"cycles": 10_000, "late_cycles": late})["cycle"].verdict == verdict
+
+
+def test_dropped_frames_are_a_problem() -> None:
+    found = findings(bus={"load": 0.2, "dropped_full": 3})["bus"]
+    assert (found.verdict, found.finding) == ("problem", "dropped_full 3")
+
+
+def test_a_healthy_daemon_has_no_problem() -> None:
+    told = findings(nodes=[READY], cycle={"cycles": 100, "late_cycles": 0}, bus={"load": 0.1, "dropped_full": 0})
+    assert {finding.verdict for finding in told.values()} == {"ok"}
+
+
+def test_the_doctor_works_without_a_daemon(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.setattr("canhelm.protocol.SYSTEM_FOLDER", tmp_path / "no-system")
+    monkeypatch.setattr("daemon.cli.doctor.NETWORK_DEVICES", tmp_path)
+    assert main(["doctor"]) == 0
+    rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert {"python", "group", "can", "daemon"} == {row["check"] for row in rows}
+
+
+def test_a_socket_on_which_nobody_answers_is_a_problem(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["doctor", "--socket", "/nonexistent/robot.sock"]) == 1
