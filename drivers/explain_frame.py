@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from drivers.canopen.codes import NMT_COMMANDS, NMT_STATES
 from drivers.canopen.objects import ObjectDef, ObjectTable
 from drivers.encoder.objects import OBJECTS as ENCODER_OBJECTS
+from drivers.epos.codec import RPDO1_MAPS, TPDO1_MAP
 from drivers.epos.codes import EMERGENCIES
 from drivers.epos.objects import OBJECTS as EPOS_OBJECTS
 from drivers.epos.state_machine import STATES, Mode, command_of, state_of
@@ -49,7 +50,7 @@ _ENCODER = "CiA 406 encoder"
 
 PDO_MAPS: dict[str, tuple[PdoMap, ...]] = {
     "TPDO1": (
-        _map(_OURS, EPOS_OBJECTS, "statusword", "position_actual_value", "current_actual_value"),
+        PdoMap(_OURS, TPDO1_MAP),
         _map(_ENCODER, ENCODER_OBJECTS, "position_value"),
         _map(_FACTORY, EPOS_OBJECTS, "velocity_actual_value", "position_actual_value"),
     ),
@@ -60,8 +61,7 @@ PDO_MAPS: dict[str, tuple[PdoMap, ...]] = {
     ),
     "TPDO3": (_map("EPOS 24/5, fixed mapping", EPOS_OBJECTS, "statusword", "mode_of_operation_display"),),
     "RPDO1": (
-        _map(_OURS + " in profile velocity mode", EPOS_OBJECTS, "controlword", "target_velocity"),
-        _map(_OURS + " in velocity mode", EPOS_OBJECTS, "controlword", "velocity_mode_setting_value"),
+        *(PdoMap(f"{_OURS} in {mode.words} mode", objects) for mode, objects in RPDO1_MAPS.items()),
         _map(_FACTORY, EPOS_OBJECTS, "velocity_mode_setting_value"),
     ),
     "RPDO2": (_map(_FACTORY, EPOS_OBJECTS, "controlword", "target_velocity"),),

@@ -429,12 +429,6 @@ DIGITAL_OUTPUT_FUNCTIONS = {
 }
 """Objects 0x2079/n, and bits of 0x2078 (maxon EPOS Firmware Specification 14.1.41, 14.1.42)."""
 
-SAVE_SIGNATURE = 0x65766173
-"""``save`` in ASCII, written to 0x1010/1."""
-
-LOAD_SIGNATURE = 0x64616F6C
-"""``load`` in ASCII, written to 0x1011/1 or 0x1011/5."""
-
 VALUE_TABLES: dict[str, dict[int, str]] = {
     "can_bit_rate_code": {code: f"{rate} bit/s" for code, rate in CAN_BIT_RATES.items()},
     "rs232_baud_rate_code": {code: f"{rate} bit/s" for code, rate in RS232_BAUD_RATES.items()},

@@ -139,14 +139,10 @@ COMMAND_PATTERNS: tuple[tuple[int, int, Command], ...] = (
 )
 """Mask, value under the mask, command: every controlword fits exactly one."""
 
-# Complete words for the modes with a profile generator: an Enable Operation with the bits of the mode.
-HALT = 0x010F
-PPM_ABSOLUTE_AFTER_CURRENT = 0x001F
+# Words that start a motion of the modes with a profile: Enable Operation with the bits of the mode.
 PPM_ABSOLUTE_AT_ONCE = 0x003F
-PPM_RELATIVE_AFTER_CURRENT = 0x005F
 PPM_RELATIVE_AT_ONCE = 0x007F
 HMM_START = 0x001F
-HMM_HALT = 0x011F
 
 
 def command_of(controlword: int) -> Command:

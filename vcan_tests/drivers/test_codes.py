@@ -12,7 +12,7 @@ from drivers.canopen.codes import (
     NmtState,
     emcy_class,
 )
-from drivers.epos.codes import EMERGENCIES, GATEWAY_ABORTS, LOAD_SIGNATURE, SAVE_SIGNATURE, VALUE_TABLES
+from drivers.epos.codes import EMERGENCIES, GATEWAY_ABORTS, VALUE_TABLES
 from drivers.epos.objects import OBJECTS
 
 TROUBLE = [*SDO_ABORTS.values(), *GATEWAY_ABORTS.values(), *EMERGENCIES.values()]
@@ -75,7 +75,3 @@ def test_an_unknown_emergency_is_named_by_its_class(code: int, words: str) -> No
 def test_value_tables_belong_to_objects_and_stay_within_their_limits(name: str) -> None:
     entry = OBJECTS[name]
     assert all((entry.low or 0) <= value <= (255 if entry.high is None else entry.high) for value in VALUE_TABLES[name])
-
-
-def test_the_signatures_are_ascii() -> None:
-    assert SAVE_SIGNATURE.to_bytes(4, "little") + LOAD_SIGNATURE.to_bytes(4, "little") == b"saveload"
