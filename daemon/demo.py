@@ -70,7 +70,7 @@ class Track:
         pose: x, y and yaw of the robot's centre, from the simulation.
         heading_rad: rear and front heading, from the encoders.
         commanded_m_s, measured_m_s: speed of each wheel.
-        slip_angle_rad: of each wheel, from the simulation.
+        slip_angle_rad, slip_ratio: of each wheel, from the simulation.
     """
 
     time_s: list[float] = field(default_factory=list)
@@ -79,6 +79,7 @@ class Track:
     commanded_m_s: list[tuple[float, ...]] = field(default_factory=list)
     measured_m_s: list[tuple[float, ...]] = field(default_factory=list)
     slip_angle_rad: list[tuple[float, ...]] = field(default_factory=list)
+    slip_ratio: list[tuple[float, ...]] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +144,6 @@ class Demo:
         begin_s, track = loop.time(), Track()
         before = self._counts()
         world.advance(begin_s)
-        world.reset_statistics()
         origin = world.pose
         observer = self._observer(track, begin_s, origin)
         app.supervisor.observers.append(observer)
@@ -195,7 +195,8 @@ class Demo:
             track.heading_rad.append(measurement.heading_rad)
             track.commanded_m_s.append(supervisor.command.wheel_speed_m_s)
             track.measured_m_s.append(measurement.wheel_speed_m_s)
-            track.slip_angle_rad.append(tuple(world.slip_angle_rad))
+            track.slip_angle_rad.append(world.slip_angle_rad)
+            track.slip_ratio.append(world.slip_ratio)
 
         return look
 
@@ -218,26 +219,21 @@ class Demo:
         return {**commanded, **end}
 
     def _achieved(self, figure: Figure, track: Track, result: dict[str, Any], duration_s: float) -> dict[str, Any]:
-        assert self.app.network is not None
-        world = self.app.network.world
         x, y, yaw = track.pose[-1]
-        radius = fitted_radius(track, figure.speed_m_s) if figure.move == "turn" else None
-        slip_deg = max(abs(angle) for row in steady(track) for angle in row)
+        radius = fitted_radius(track) if figure.move == "turn" else None
+        rows = steady_rows(track)
+        slip_ratio = max(abs(ratio) for row in rows for ratio in track.slip_ratio[row])
+        slip_angle = max(abs(angle) for row in rows for angle in track.slip_angle_rad[row])
         return {
             "end_x_m": round(x, 4),
             "end_y_m": round(y, 4),
             "heading_deg": round(math.degrees(yaw), 3),
             "radius_m": None if radius is None else round(radius, 4),
             "steering_error_deg": round(result["steering_error_deg"], 4),
-            "max_slip_ratio": round(world.max_slip_ratio, 4),
-            "max_slip_angle_deg": round(math.degrees(slip_deg), 3),
+            "max_slip_ratio": round(slip_ratio, 4),
+            "max_slip_angle_deg": round(math.degrees(slip_angle), 3),
             "duration_s": round(duration_s, 3),
         }
-
-
-def steady(track: Track) -> list[tuple[float, ...]]:
-    """Slip angles of the wheels while the robot drives at its commanded speed."""
-    return [track.slip_angle_rad[row] for row in steady_rows(track)]
 
 
 def steady_rows(track: Track) -> list[int]:
@@ -248,7 +244,7 @@ def steady_rows(track: Track) -> list[int]:
     return settled or rows
 
 
-def fitted_radius(track: Track, speed_m_s: float) -> float:
+def fitted_radius(track: Track) -> float:
     """Radius of the circle that fits the centre's steady track best (algebraic least squares) [m]."""
     points = np.array([track.pose[row][:2] for row in steady_rows(track)])
     matrix = np.column_stack([2 * points, np.ones(len(points))])

@@ -27,6 +27,7 @@ LOOKING = Group("Looking", sort_key=2)
 NETWORK = Group("Network and devices", sort_key=3)
 SETUP = Group("Daemon and setup", sort_key=4)
 EXPERIMENTS = Group("Simulation and experiments", sort_key=5)
+FLAGS = Group("Flags", sort_key=6)
 
 COMMANDS: dict[Group, dict[str, str]] = {
     DRIVING: {
@@ -77,6 +78,8 @@ def build_app() -> App:
         config=OptionEnv("CANHELM_", command=False, show=False),
         suppress_keyboard_interrupt=False,
     )
+    for flag in ("--help", "--version"):
+        app[flag].group = (FLAGS,)
     for group, commands in COMMANDS.items():
         for rank, (name, path) in enumerate(commands.items()):
             app.command(path, name=name, group=group, sort_key=rank)

@@ -23,20 +23,17 @@ from daemon.loops.geometry import (
     PerPair,
     PerWheel,
     Point,
-    TurningSolution,
     clamp,
-    solve_turning,
 )
+from daemon.loops.locked_drive import LockedDrive
 from daemon.loops.measurement import Command, Measurement
 from daemon.loops.motion_profile import ARRIVED_M, ramp, speed_to_end
-from daemon.loops.paired_steer_target import PairedSteerTarget, check_target, turning_warnings
+from daemon.loops.paired_steer_target import PairedSteerTarget, check_target
 from daemon.loops.steering import REST_SPEED_M_S, SETTLE_TIME_S, PairSteering, SteeringPhase
 from profiles.schema import Limits, PairedSteerGeometry
 
 RESTEER_RAD: Final = math.radians(1.0)
 """While driving without an end, a new direction that differs less than this is not steered for."""
-BRAKE_SLIP_RAD: Final = math.radians(5.0)
-"""A pair that turned more than this while its brake is engaged is not where it was locked."""
 WAIT_S: Final = 3.0
 """Time that brakes and wheels have to come to where they are commanded."""
 MAX_TURNS: Final = 3
@@ -126,10 +123,7 @@ class PairedSteerLaw:
         self._turns = [0, 0]
         self._steering = PairSteering(geometry.contact_offset_m, limits)
         self._rim_speed_m_s = 0.0
-        self._held_rad: PerPair | None = None
-        self._unit: TurningSolution | None = None
-        self._warnings: tuple[str, ...] = ()
-        self._acceleration_m_s2 = limits.acceleration_m_s2
+        self._locked: LockedDrive | None = None
         self._speed_m_s = 0.0
         self._ramping = False
         self._finished = False
@@ -186,10 +180,10 @@ class PairedSteerLaw:
 
     def _may_roll_on(self) -> bool:
         """Whether the new motion goes on from the rolling one without new headings."""
-        if self._failure or self._held_rad is None:
+        if self._failure or self._locked is None:
             return False
         rolling = self._phase is Phase.DRIVING or self._speed_m_s != 0
-        return rolling and self._moves() and self._next_pair(self._held_rad) is None
+        return rolling and self._moves() and self._next_pair(self._locked.heading_rad) is None
 
     def _moves(self) -> bool:
         return self._target is not None and self._target.moves and not self._finished
@@ -226,14 +220,11 @@ class PairedSteerLaw:
 
     def _wheels(self) -> PerWheel:
         """Wheel speeds for the commanded speed of the centre."""
-        if self._unit is None or self._speed_m_s == 0:
-            return _STANDING
-        first, second, third, fourth = self._unit.roll_speed_m_s
-        speed = self._speed_m_s
-        return (speed * first, speed * second, speed * third, speed * fourth)
+        return _STANDING if self._locked is None else self._locked.wheel_speeds(self._speed_m_s)
 
     def _rest(self, measurement: Measurement, dt: float) -> PerWheel:
-        self._speed_m_s = ramp(self._speed_m_s, 0.0, self._acceleration_m_s2, dt)
+        if self._locked is not None:
+            self._speed_m_s = ramp(self._speed_m_s, 0.0, self._locked.acceleration_m_s2, dt)
         return self._wheels()
 
     def _stop(self, measurement: Measurement, dt: float) -> PerWheel:
@@ -261,7 +252,7 @@ class PairedSteerLaw:
         if pair is not None:
             return self._begin_turn(pair, measurement)
         if self._moves():
-            self._hold(measurement)
+            self._locked = LockedDrive(self._geometry, self._limits, self._locked_headings(measurement))
             self._enter(Phase.DRIVING)
         else:
             self._finished = self._target is not None and self._target.distance_m is not None
@@ -318,47 +309,40 @@ class PairedSteerLaw:
         self._enter(Phase.STOPPING)
         return _STANDING
 
-    def _hold(self, measurement: Measurement) -> None:
-        """Fix the headings that the brakes hold, and with them the kinematics of the drive."""
+    def _locked_headings(self, measurement: Measurement) -> PerPair:
+        """Where the brakes hold the pairs: the target where they were steered to it, else the reading."""
         stop_rad = math.radians(self._geometry.max_heading_deg)
         errors = [self._heading_error(measurement.heading_rad, pair) for pair in (REAR, FRONT)]
         rear, front = (
             heading + error if abs(error) <= self._tolerance_rad else clamp(heading, stop_rad)
             for heading, error in zip(measurement.heading_rad, errors, strict=True)
         )
-        self._held_rad = (rear, front)
-        self._unit = solve_turning(self._geometry, rear, front, 1.0)
-        self._warnings = turning_warnings(self._geometry, self._unit)
-        fastest = max(1.0, *(abs(speed) for speed in self._unit.roll_speed_m_s))
-        self._acceleration_m_s2 = self._limits.acceleration_m_s2 / fastest
+        return (rear, front)
 
     def _drive(self, measurement: Measurement, dt: float) -> PerWheel:
         if not all(measurement.brake_engaged):
             return self._fail(f"{self._not_engaged(measurement)} while driving")
-        slipped = self._slipped(measurement)
+        assert self._locked is not None
+        assert self._target is not None
+        slipped = self._locked.slipped_pair(measurement.heading_rad)
         if slipped is not None:
             return self._fail(f"the {PAIR_NAMES[slipped]} pair turned although its brake is engaged; check its brake")
-        assert self._target is not None
-        before = self._speed_m_s
+        before, acceleration = self._speed_m_s, self._locked.acceleration_m_s2
         if self._remaining_m is None:
-            self._speed_m_s = ramp(before, self._target.speed_m_s, self._acceleration_m_s2, dt)
+            self._speed_m_s = ramp(before, self._target.speed_m_s, acceleration, dt)
         else:
             limit, way = abs(self._target.speed_m_s), self._remaining_m
-            self._speed_m_s = speed_to_end(before, limit, self._acceleration_m_s2, way, dt)
+            self._speed_m_s = speed_to_end(before, limit, acceleration, way, dt)
             self._remaining_m = way - self._speed_m_s * dt
             if self._speed_m_s == 0 and abs(self._remaining_m) < ARRIVED_M:
                 self._finished = True
                 self._enter(Phase.STOPPING)
-        self._ramping = abs(self._speed_m_s - before) > self._acceleration_m_s2 * dt * (1 - 1e-9)
+        self._ramping = abs(self._speed_m_s - before) > acceleration * dt * (1 - 1e-9)
         return self._wheels()
 
-    def _slipped(self, measurement: Measurement) -> int | None:
-        assert self._held_rad is not None
-        pairs = enumerate(zip(measurement.heading_rad, self._held_rad, strict=True))
-        return next((pair for pair, (now, held) in pairs if not abs(now - held) <= BRAKE_SLIP_RAD), None)
-
     def _record(self, measurement: Measurement) -> PairedSteerRecord:
-        unit = self._unit if self._phase is Phase.DRIVING else None
+        driving = self._locked if self._phase is Phase.DRIVING else None
+        unit = driving.unit if driving else None
         return PairedSteerRecord(
             phase=self._phase,
             pair=None if self._pair is None else PAIR_NAMES[self._pair],
@@ -374,7 +358,7 @@ class PairedSteerLaw:
             yaw_rate_rad_s=self._speed_m_s * unit.yaw_rate_rad_s if unit else 0.0,
             mismatch_rad=unit.mismatch_rad if unit else _STANDING,
             limits_active=("acceleration",) if unit and self._ramping else (),
-            warnings=self._warnings if unit else (),
+            warnings=driving.warnings if driving else (),
             done=self._phase is Phase.RESTING and (self._target is None or self._finished),
             failure=self._failure,
         )

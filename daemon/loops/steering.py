@@ -21,8 +21,8 @@ GAIN_1_S: Final = 6.0
 SETTLE_TIME_S: Final = 0.05
 CREEP_TIME_S: Final = 0.1
 """The slowest turning covers one tolerance in this time; slower, dry friction would hold the pair."""
-PROGRESS_TIME_S: Final = 2.0
-"""Time in which a pair has to come nearer to its target."""
+PROGRESS_TIME_S: Final = 4.0
+"""Time in which a pair has to come nearer to its target; soft speed regulators need long against dry friction."""
 WRONG_WAY_RAD: Final = math.radians(5)
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable
 from typing import Any
 
-from canhelm.errors import CanhelmError, Refused
+from canhelm.errors import Refused
 from daemon.runtime.brake_commands import BrakeCommands
 from daemon.runtime.handlers import Handler, Params, holder, run_motion
 from daemon.runtime.motions import Motion
@@ -93,14 +92,12 @@ class Commands:
 
     async def _motion_wait(self, params: Params, lease: str | None) -> dict[str, Any]:
         motion = self._motion(params)
-        return {"motion": motion.identity, **await motion.ended}
+        return {"motion": motion.identity, **await motion.result()}
 
     async def _motion_stop(self, params: Params, lease: str | None) -> dict[str, Any]:
         motion = self._motion(params)
         motion.stop("its client stopped it")
-        with contextlib.suppress(CanhelmError):
-            await motion.ended
-        await self._supervisor.until_rest()
+        await motion.closed.wait()
         return {"motion": motion.identity, "state": self._supervisor.state.value}
 
     async def _simulation_power(self, params: Params, lease: str | None) -> dict[str, Any]:

@@ -18,7 +18,7 @@ async def run_motion(supervisor: Supervisor, motion: Motion, params: Params) -> 
     supervisor.admit(motion)
     if motion.streaming or not params.get("wait", True):
         return {"motion": motion.identity}
-    return {"motion": motion.identity, **await motion.ended}
+    return {"motion": motion.identity, **await motion.result()}
 
 
 def holder(params: Params, lease: str | None, *, endless: bool = False) -> str | None:

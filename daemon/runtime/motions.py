@@ -26,6 +26,7 @@ class Motion(ABC):
     Attributes:
         identity: number by which clients name it.
         ended: holds the result, or the error that ended it.
+        closed: set when its drives are at rest and as it found them.
     """
 
     streaming = False
@@ -41,6 +42,7 @@ class Motion(ABC):
         self.begun_s = 0.0
         self.ended: asyncio.Future[dict[str, Any]] = asyncio.get_running_loop().create_future()
         self.ended.add_done_callback(_observe)
+        self.closed = asyncio.Event()
 
     @abstractmethod
     def step(self, measurement: Measurement, dt_s: float) -> Command:
@@ -65,6 +67,11 @@ class Motion(ABC):
     def summary(self) -> dict[str, Any]:
         """The motion for ``status``."""
         return {"motion": self.identity, "kind": self.kind, "drives": list(self.drives), **self.progress()}
+
+    async def result(self) -> dict[str, Any]:
+        """Wait until it is closed; its result. Raises the error that ended it."""
+        await self.closed.wait()
+        return self.ended.result()
 
     def finish(self, result: dict[str, Any]) -> None:
         """End well, or as stopped where a stop was asked for."""

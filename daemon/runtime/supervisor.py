@@ -167,6 +167,7 @@ class Supervisor:
             motion.running = False
             await self._leave_as_found(drives, enabled_here)
             self.motions.pop(motion.identity, None)
+            motion.closed.set()
 
     async def _leave_as_found(self, drives: list[Drive], enabled_here: list[Drive]) -> None:
         await self.until_rest()

@@ -1,4 +1,4 @@
-"""Typed definitions: one entry per object, error code and bit, read by codec, simulator, command line and docs alike."""
+"""Typed definitions, one per object, error code and bit: read by codec, simulator, command line and docs alike."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class DataType(Enum):
         """Little-endian bytes of a value. Raises struct.error or TypeError for a value that does not fit."""
         if self.bits:
             return struct.pack("<" + self.code, value)
-        return value.encode("ascii") if isinstance(value, str) else bytes(value)  # type: ignore[arg-type]
+        return value.encode("ascii") if isinstance(value, str) else bytes(value)
 
     def unpack(self, data: bytes) -> int | str | bytes:
         """The value of little-endian bytes. Raises struct.error where the length is wrong."""
@@ -107,7 +107,7 @@ class CodeDef:
         cause: what usually leads to it.
         cure: what to do about it.
         register: error register bits that come with an EMCY code, None where not documented.
-        reaction: ``"D"`` (power stage off at once) or ``"Q"`` (quick-stop ramp, then off) for faults of a drive, else ``""``.
+        reaction: for faults of a drive ``"D"`` (power stage off at once) or ``"Q"`` (quick-stop ramp, then off).
         source: document and section.
     """
 

@@ -65,9 +65,10 @@ async def test_an_enabled_motor_stays_enabled_after_its_motion() -> None:
 async def test_a_profile_position_move_turns_the_motor_by_its_counts() -> None:
     async with running_robot() as robot:
         before = robot.network.world.axes["front_left"].position_rad
-        await robot.call("motor.position", node=3, position_qc=10_000, relative=True, velocity_rpm=500.0)
+        await robot.call("motor.position", node=3, position_qc=10_000, relative=True, velocity_rpm=250.0)
         turned = robot.network.world.axes["front_left"].position_rad - before
-        assert turned == pytest.approx(10_000 / 2000 * math.tau, abs=0.1)
+        relaxed_rad = 0.4  # of motor shaft, 1.4 mm at the rim: the tyres unwind when the power goes off
+        assert turned == pytest.approx(10_000 / 2000 * math.tau, abs=relaxed_rad)
 
 
 async def test_a_stream_of_values_drives_and_a_stale_one_stops() -> None:

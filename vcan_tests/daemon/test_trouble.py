@@ -8,6 +8,7 @@ import pytest
 
 from canhelm.errors import CanhelmError, DeviceFault, EmergencyStop, NotReady
 from drivers.epos.objects import OBJECTS
+from drivers.simulated.epos import SimulatedEpos
 from vcan_tests.robot import Robot, running_robot
 
 TWO_GUARDING_PERIODS_S = 0.2
@@ -102,7 +103,9 @@ async def test_the_emergency_stop_is_latched_until_a_reset() -> None:
 async def test_a_fault_of_a_drive_stops_the_vehicle_and_says_cause_and_cure() -> None:
     async with running_robot(expect_errors=True) as robot:
         driving = await _drive(robot)
-        robot.network.node(2).trigger_fault(0x4210)
+        drive = robot.network.node(2)
+        assert isinstance(drive, SimulatedEpos)
+        drive.trigger_fault(0x4210)
         await robot.until(lambda: robot.speed_m_s < 0.01, 3.0)
         with pytest.raises(DeviceFault, match="temperature"):
             await driving
