@@ -22,7 +22,7 @@ from drivers.simulated.epos_homing import Homing
 from drivers.simulated.epos_io import NEGATIVE_LIMIT, DigitalInputs, DigitalOutputs
 from drivers.simulated.epos_measurements import Measurements
 from drivers.simulated.epos_motion import Motion
-from drivers.simulated.epos_settings import FACTORY, PARAMETERS, SET_VALUES, VOLATILE, Settings, commissioned
+from drivers.simulated.epos_settings import FACTORY, PARAMETERS, VOLATILE, Settings, commissioned
 from drivers.simulated.epos_state import DeviceControl
 from drivers.simulated.node import SimulatedNode, signature_check
 from drivers.simulated.world import Axis, World
@@ -85,6 +85,7 @@ class SimulatedEpos(SimulatedNode):
         self._world = world
         self._word = 0
         self._sensor = (0, 0)
+        self._supply_v = 24.0
         super().__init__(port, config.node, dictionary, receive_pdos=3, transmit_pdos=3, boot_delay_s=boot_delay_s)
         dictionary.commission(commissioned(config))
         self._describe_objects_of_drive()
@@ -102,8 +103,13 @@ class SimulatedEpos(SimulatedNode):
 
     def set_supply_voltage(self, voltage_v: float) -> None:
         """Change the supply voltage as the drive measures it; outside its range the drive faults until it is back."""
+        self._supply_v = voltage_v
+        if self.control.state is not State.START:
+            self._watch_supply()
+
+    def _watch_supply(self) -> None:
         low, high = _SUPPLY_RANGE_V
-        for code, present in ((_UNDER_VOLTAGE, voltage_v < low), (_OVER_VOLTAGE, voltage_v > high)):
+        for code, present in ((_UNDER_VOLTAGE, self._supply_v < low), (_OVER_VOLTAGE, self._supply_v > high)):
             if present and code not in self.control.causes:
                 self.trigger_fault(code, lasting=True)
             elif not present:
@@ -115,8 +121,10 @@ class SimulatedEpos(SimulatedNode):
         Args:
             code: EMCY code.
             lasting: the cause stays, so that a fault reset does nothing, until :meth:`clear_cause`.
+
+        A drive that is off or boots has no faults.
         """
-        if not self.powered:
+        if self.control.state is State.START:
             return
         entry = EMERGENCIES[code]
         if lasting:
@@ -148,6 +156,7 @@ class SimulatedEpos(SimulatedNode):
         self.control.initialised()
         self._inputs.restart()
         self.outputs.switch(powered=True)
+        self._watch_supply()
 
     def application_stopped(self) -> None:
         """Power lost or reset: power stage off, outputs released."""
@@ -194,7 +203,7 @@ class SimulatedEpos(SimulatedNode):
         }
         actions: dict[str, Callable[[int], None]] = {
             **dict.fromkeys(PARAMETERS, self._settings.take_parameters),
-            **dict.fromkeys(SET_VALUES, self._settings.take_set_values),
+            **self._settings.set_value_actions(),
             "controlword": self._on_controlword,
             "mode_of_operation": lambda value: self.motion.change_mode(Mode(value)),
             "encoder_pulses_per_turn": self._on_sensor_changed,

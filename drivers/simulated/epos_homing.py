@@ -67,6 +67,7 @@ class Homing:
         """Rising edge of the start bit."""
         self._method = method
         self.referenced = False
+        self._motion.ramp.speed = self._motion.axis.speed_rad_s
         if method in _PRESENT_POSITION:
             self._found(self._motion.axis.position_rad)
         elif method in _INDEX or method in _THRESHOLD:
@@ -128,7 +129,8 @@ class Homing:
         """Bits 10, 12 and 13 of the statusword."""
         motion = self._motion
         if motion.halted:
-            return TARGET_REACHED if motion.ramp.speed == 0.0 else 0
+            speed = motion.profile.speed if self._phase is Phase.MOVING else motion.ramp.speed
+            return TARGET_REACHED if speed == 0.0 else 0
         if self._phase is Phase.ATTAINED:
             return TARGET_REACHED | BIT_12
         return BIT_13 if self._phase is Phase.FAILED else 0

@@ -236,12 +236,11 @@ class Motion:
         speed = min(parameters.profile_speed, parameters.max_speed)
         point = SetPoint(position_qc, relative, speed, parameters.acceleration, parameters.deceleration)
         if at_once or self._set_point is None:
+            self.acknowledged = True
             self._begin(point)
         elif self._next is None:
+            self.acknowledged = True
             self._next = point
-        else:
-            return
-        self.acknowledged = True
 
     def clear_set_point_bit(self) -> None:
         """The set-point bit is 0: the acknowledge falls as soon as no set-point waits."""
@@ -284,7 +283,7 @@ class Motion:
 
     def _follow_velocity(self, speed: float, _position: float, dt_s: float) -> float:
         limit = self.parameters.max_speed
-        self.demand_speed = self.ramp.speed = min(max(self.set_values.velocity, -limit), limit)
+        self.demand_speed = min(max(self.set_values.velocity, -limit), limit)
         return self.regulator.follow_speed(self.demand_speed, 0.0, speed, dt_s)
 
     def _follow_current(self, speed: float, _position: float, dt_s: float) -> float:
@@ -303,6 +302,8 @@ class Motion:
             self._set_point = None
             if self._next is not None:
                 self._begin(self._next)
+        if self._stopping:
+            return self._brake(speed, position, dt_s)
         self.run_profile(dt_s)
         return self.regulate_position(speed, position, dt_s)
 
@@ -321,9 +322,10 @@ class Motion:
         profile = self.profile
         error = profile.position - position
         if abs(error) * self.qc_per_rad > self.parameters.following_error_qc:
-            self.following_error = True
             self._raise_fault(FOLLOWING_ERROR)
-        self.demand_speed = self.ramp.speed = profile.speed + self.regulator.speed_for(error)
+            self.following_error = True
+            return self._brake(speed, position, dt_s)
+        self.demand_speed = profile.speed + self.regulator.speed_for(error)
         return self.regulator.follow_speed(self.demand_speed, profile.slope, speed, dt_s)
 
     # Statusword

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import tau
 
 from drivers.simulated.dictionary import SimulatedDictionary, Value
@@ -48,12 +49,6 @@ PARAMETERS = (
     "max_speed_in_current_mode",
     "thermal_time_constant_winding",
 )
-SET_VALUES = (
-    "target_velocity",
-    "velocity_mode_setting_value",
-    "position_mode_setting_value",
-    "current_mode_setting_value",
-)
 _MOTOR_TYPES = {"brushed_dc": 1, "brushless_sine": 10, "brushless_block": 11}
 
 
@@ -65,6 +60,9 @@ class Settings:
         motion: its motion control.
         homing: its homing mode.
         mounted_pulses: pulses per turn of the encoder on the motor.
+
+    Attributes:
+        rad_s_per_rpm: shaft speed of what the drive takes for 1 rpm: it counts quad counts and trusts 0x2210/1.
     """
 
     def __init__(self, dictionary: SimulatedDictionary, motion: Motion, homing: Homing, mounted_pulses: int) -> None:
@@ -72,11 +70,7 @@ class Settings:
         self._motion = motion
         self._homing = homing
         self._mounted_pulses = mounted_pulses
-
-    @property
-    def rad_s_per_rpm(self) -> float:
-        """Shaft speed of what the drive takes for 1 rpm: it counts quad counts and trusts 0x2210/1."""
-        return tau / 60.0 * self._dictionary.number("encoder_pulses_per_turn") / self._mounted_pulses
+        self.rad_s_per_rpm = tau / 60.0
 
     @property
     def sensor(self) -> tuple[int, int]:
@@ -86,8 +80,9 @@ class Settings:
 
     def take_parameters(self, _: int = 0) -> None:
         """One of :data:`PARAMETERS` was written."""
-        number, rpm, motion = self._dictionary.number, self.rad_s_per_rpm, self._motion
+        number, motion = self._dictionary.number, self._motion
         parameters, regulator = motion.parameters, motion.regulator
+        rpm = self.rad_s_per_rpm = tau / 60.0 * number("encoder_pulses_per_turn") / self._mounted_pulses
         parameters.profile_speed = number("profile_velocity") * rpm
         parameters.max_speed = number("max_profile_velocity") * rpm
         parameters.acceleration = number("profile_acceleration") * rpm
@@ -112,14 +107,32 @@ class Settings:
         homing.offset_qc = number("home_offset")
         homing.home_position_qc = number("home_position")
 
-    def take_set_values(self, _: int = 0) -> None:
-        """One of :data:`SET_VALUES` was written."""
-        number, rpm, values = self._dictionary.number, self.rad_s_per_rpm, self._motion.set_values
-        values.target_velocity = number("target_velocity") * rpm
-        values.velocity = number("velocity_mode_setting_value") * rpm
-        values.position_qc = number("position_mode_setting_value")
-        values.current_a = 0.001 * number("current_mode_setting_value")
+    def set_value_actions(self) -> dict[str, Callable[[int], None]]:
+        """Actions of the objects that the modes run after, by name."""
+        return {
+            "target_velocity": self._take_target_velocity,
+            "velocity_mode_setting_value": self._take_velocity,
+            "position_mode_setting_value": self._take_position,
+            "current_mode_setting_value": self._take_current,
+        }
+
+    def take_set_values(self) -> None:
+        """Carry over all set values (power-up)."""
+        for name, action in self.set_value_actions().items():
+            action(self._dictionary.number(name))
+
+    def _take_target_velocity(self, value_rpm: int) -> None:
+        self._motion.set_values.target_velocity = value_rpm * self.rad_s_per_rpm
         self._motion.update()
+
+    def _take_velocity(self, value_rpm: int) -> None:
+        self._motion.set_values.velocity = value_rpm * self.rad_s_per_rpm
+
+    def _take_position(self, value_qc: int) -> None:
+        self._motion.set_values.position_qc = value_qc
+
+    def _take_current(self, value_ma: int) -> None:
+        self._motion.set_values.current_a = 0.001 * value_ma
 
 
 def commissioned(config: DriveConfig) -> dict[str, Value]:

@@ -70,9 +70,10 @@ class SimulatedNetwork:
     def node(self, which: int | str) -> SimulatedNode:
         """A node by its id or its name. Raises KeyError where there is none."""
         nodes: dict[str, SimulatedNode] = {**self.drives, **self.encoders}
-        if isinstance(which, str) and which in nodes:
-            return nodes[which]
-        return {node.node_id: node for node in nodes.values()}[int(which)]
+        for name, node in nodes.items():
+            if which in (name, node.node_id, str(node.node_id)):
+                return node
+        raise KeyError(which)
 
     def power_on(self, which: int | str = "all") -> None:
         """Switch on one node, by id or name, or all; each boots after its own delay."""

@@ -253,7 +253,7 @@ class SimulatedNode:
             return
         self.before_access(now_s)
         answer = self._sdo.answer(data)
-        if answer is not None and self.powered:
+        if answer is not None:
             self.port.send(_SDO_ANSWER + self.node_id, answer)
 
     def _on_nmt(self, data: bytes, _: float) -> None:
