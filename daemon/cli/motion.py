@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
 import sys
 from collections.abc import Iterator
@@ -77,13 +78,19 @@ def progress_line(client: Client) -> Iterator[None]:
 
 def _draw(method: str, params: dict[str, Any]) -> None:
     if method == "status":
-        print(f"{CLEAR_LINE}{progress_text(params)[:100]}", end="", file=sys.stderr, flush=True)
+        width = shutil.get_terminal_size().columns - 1
+        print(f"{CLEAR_LINE}{progress_text(params)[:width]}", end="", file=sys.stderr, flush=True)
     elif method == "event" and params.get("severity") != "info":
         print(CLEAR_LINE, end="", file=sys.stderr)
         say(str(params.get("message")))
 
 
 def progress_text(status: dict[str, Any]) -> str:
-    """The state and what the motion reports of itself, in one line."""
-    motions = "; ".join(words(motion, digits=3) for motion in status.get("motions") or ())
-    return f"{status.get('state')}  {motions}"
+    """What the motions report of themselves, in one line; the vehicle's state where none runs."""
+    motions = status.get("motions") or ()
+    return "; ".join(_progress(motion) for motion in motions) or str(status.get("state"))
+
+
+def _progress(motion: dict[str, Any]) -> str:
+    rest = {key: value for key, value in motion.items() if key not in ("motion", "kind", "drives")}
+    return f"{motion.get('kind')}: {words(rest, digits=3)}"

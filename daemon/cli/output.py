@@ -91,5 +91,7 @@ def say(text: str) -> None:
 
 
 def say_error(error: CanhelmError) -> None:
-    """What went wrong and what to do next, on stderr."""
-    say(f"{error.message} - {error.remedy}" if error.remedy else error.message)
+    """What went wrong, the limit that it broke, and what to do next, on stderr."""
+    limit = "" if error.limit is None or str(error.limit) in error.message else f" (limit: {error.limit})"
+    remedy = f" - {error.remedy}" if error.remedy else ""
+    say(f"{error.message}{limit}{remedy}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
@@ -14,7 +14,19 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.table import Table
 
-COLUMNS = ("node", "name", "device", "node_state", "state", "velocity_rpm", "speed_m_s", "current_a", "heading_deg")
+COLUMNS = {
+    "node": "node",
+    "name": "name",
+    "device": "device",
+    "state": "state",
+    "velocity_rpm": "rpm",
+    "speed_m_s": "m/s",
+    "current_a": "A",
+    "heading_deg": "heading °",
+}
+"""Fields of a node that are shown, and the heads of their columns."""
+HIDDEN = ("type", "methods", "name", "bit_rate")
+"""Fields of a section that do not change and are left to JSON."""
 SEVERE = ("fault", "estop", "refused", "absent", "error")
 BUSY = ("active", "stopping", "waiting", "booting", "configuring", "warning")
 SHOWN_EVENTS = 5
@@ -50,10 +62,8 @@ def table(data: Mapping[str, Any]) -> RenderableType:
     """The status for a terminal."""
     from rich.console import Group
 
-    parts: list[RenderableType] = [_headline(data), _nodes(data.get("nodes") or ())]
-    parts += [
-        _line(title, data[title]) for title in ("brakes", "vehicle", "motions", "cycle", "bus") if data.get(title)
-    ]
+    parts: list[RenderableType] = [_headline(data), _nodes(data.get("nodes") or ()), _brakes(data.get("brakes") or ())]
+    parts += [_section(title, data[title]) for title in ("vehicle", "motions", "cycle", "bus") if data.get(title)]
     parts += [_event(event) for event in list(data.get("events") or ())[-SHOWN_EVENTS:]]
     return Group(*parts)
 
@@ -74,34 +84,55 @@ def _colour(state: str) -> str:
     return "yellow" if state in BUSY else "green"
 
 
-def _nodes(nodes: Any) -> Table:
+def _nodes(nodes: Sequence[Mapping[str, Any]]) -> Table:
     from rich.table import Table
     from rich.text import Text
 
     shown = [column for column in COLUMNS if any(column in node for node in nodes)]
-    grid = Table(*shown, "status", box=None, header_style="bold", pad_edge=False)
+    grid = Table(box=None, header_style="bold", pad_edge=False)
+    for column in shown:
+        grid.add_column(COLUMNS[column], no_wrap=True)
+    grid.add_column("")
     for node in nodes:
-        cells = [Text(words(node.get(column)), _state_style(column, node)) for column in shown]
-        grid.add_row(*cells, Text(_sentence(node)))
+        cells = {column: words(node.get(column)) for column in shown}
+        cells["state"] = _node_state(node)
+        grid.add_row(*(Text(cell, _style(column, cell)) for column, cell in cells.items()), Text(_trouble(node)))
     return grid
 
 
-def _state_style(column: str, node: Mapping[str, Any]) -> str:
-    return _colour(str(node.get(column))) if column in ("state", "node_state") else ""
+def _node_state(node: Mapping[str, Any]) -> str:
+    return str(node.get("state", "ready") if node.get("node_state") == "ready" else node.get("node_state"))
 
 
-def _sentence(node: Mapping[str, Any]) -> str:
+def _style(column: str, cell: str) -> str:
+    return _colour(cell) if column == "state" else ""
+
+
+def _trouble(node: Mapping[str, Any]) -> str:
     fault = node.get("fault")
     if isinstance(fault, Mapping):
-        return f"{fault.get('message', '')} - {fault.get('remedy', '')}".rstrip(" -")
-    return str(fault or node.get("status") or "")
+        return f"{fault.get('message', '')} - {fault.get('remedy', '')}"
+    return str(fault or "") or ("" if node.get("node_state") == "ready" else str(node.get("status")))
 
 
-def _line(title: str, value: Any) -> RenderableType:
+def _brakes(brakes: Sequence[Mapping[str, Any]]) -> RenderableType:
+    from rich.text import Text
+
+    told = ", ".join(f"{brake.get('name')} {brake.get('state')}" for brake in brakes)
+    return Text.assemble(("brakes: ", "bold"), told or "none")
+
+
+def _section(title: str, value: Any) -> RenderableType:
     from rich.text import Text
 
     items = value if isinstance(value, list) else [value]
-    return Text.assemble((f"{title}: ", "bold"), "; ".join(words(item) for item in items))
+    return Text.assemble((f"{title}: ", "bold"), "; ".join(words(_telling(item)) for item in items))
+
+
+def _telling(item: Mapping[str, Any]) -> dict[str, Any]:
+    """A section without what never changes and without counters that stand at zero."""
+    zero = [key for key, value in item.items() if isinstance(value, int) and not value]
+    return {key: value for key, value in item.items() if key not in HIDDEN and key not in zero}
 
 
 def _event(event: Mapping[str, Any]) -> RenderableType:
