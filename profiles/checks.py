@@ -40,11 +40,14 @@ class Finding:
     other: Path_ | None = None
 
     def located(self, tree: Node) -> Mistake:
-        """The mistake with its file and line."""
-        what = self.what
+        """The mistake with its file and line; of two places the one in the robot's own file is blamed."""
+        path, place, what = self.path, place_of(tree, self.path), self.what
         if self.other is not None:
-            what = what.replace("{other}", f"{dotted(self.other)} ({place_of(tree, self.other)})")
-        return Mistake(place_of(tree, self.path), dotted(self.path), what, self.remedy)
+            other, other_place = self.other, place_of(tree, self.other)
+            if place.file != tree.place.file == other_place.file:
+                path, place, other, other_place = other, other_place, path, place
+            what = what.replace("{other}", f"{dotted(other)} ({other_place})")
+        return Mistake(place, dotted(path), what, self.remedy)
 
 
 def findings(data: dict[str, Any]) -> Iterator[Finding]:

@@ -187,5 +187,9 @@ def _checked(tree: Node | None, mistakes: list[Mistake]) -> tuple[Profile | None
 
 def _in_order(mistakes: list[Mistake], path: Path) -> list[Mistake]:
     """By file and line, the robot's own file first; one mistake in a file that four drives extend is one mistake."""
-    unique = {(mistake.place, mistake.what): mistake for mistake in reversed(mistakes)}.values()
-    return sorted(unique, key=lambda found: (found.place.file != str(path), found.place.file, found.place.line))
+    unique: dict[tuple[Place, str], Mistake] = {}
+    for mistake in mistakes:
+        unique.setdefault((mistake.place, mistake.what), mistake)
+    return sorted(
+        unique.values(), key=lambda found: (found.place.file != str(path), found.place.file, found.place.line)
+    )

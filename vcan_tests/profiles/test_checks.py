@@ -7,13 +7,14 @@ from pathlib import Path
 import pytest
 
 from canhelm.errors import ConfigError
-from profiles.loader import load
+from profiles.loader import SHIPPED, load
 from vcan_tests.profiles.conftest import Mistakes, Robot
 
 
 @pytest.mark.parametrize(
     ("yaml", "mistake"),
     [
+        ("drives: {rear_right: {node: 2}}", "drives.rear_right.node: node id 2 is taken by drives.rear_left.node ("),
         ("drives: {front_left: {node: 2}}", "drives.front_left.node: node id 2 is taken by drives.rear_left.node ("),
         ("encoders: {rear: {node: 1}}", "encoders.rear.node: node id 1 is taken by drives.rear_right.node ("),
         (
@@ -32,7 +33,7 @@ from vcan_tests.profiles.conftest import Mistakes, Robot
             "brakes: {rear: {output_bit: 15}}",
             "brakes.rear.output_bit: bit 15 does not drive output 4; write output_bit: 12",
         ),
-        ("brakes: {rear: {drive: front_left}}", "brakes.front: output 4 of front_left already switches brakes.rear ("),
+        ("brakes: {rear: {drive: front_left}}", "brakes.rear: output 4 of front_left already switches brakes.front ("),
         (
             "encoders: {rear: {total_counts: 4000}}",
             "encoders.rear.total_counts: is 4000, less than one turn; write 4096",
@@ -63,5 +64,10 @@ def test_a_weak_output_for_a_brake_is_a_warning(robot: Robot) -> None:
     assert "carries 100 mA only" in robot("brakes: {rear: {output: 3, output_bit: 13}}").warnings[0]
 
 
-def test_the_second_place_of_a_double_node_id_is_named_with_file_and_line(mistakes: Mistakes) -> None:
-    assert "taken by drives.rear_right.node (" in mistakes("encoders: {front: {node: 1}}")[0]
+def test_a_clash_with_an_inherited_value_is_blamed_on_the_own_file(mistakes: Mistakes) -> None:
+    shipped = (SHIPPED / "robots/max2d.yaml").read_text().splitlines()
+    line = next(number for number, text in enumerate(shipped, 1) if "node: !assumed 5" in text)
+    assert mistakes("drives: {rear_left: {node: 5}}") == [
+        "lab.yaml:4: drives.rear_left.node: node id 5 is taken by encoders.rear.node "
+        f"({SHIPPED}/robots/max2d.yaml:{line}); give each its own"
+    ]
