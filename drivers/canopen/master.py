@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from canhelm.errors import Aborted, NodeAbsent, Timeout
+from canhelm.errors import Aborted, NodeAbsent, Timeout, UsageError
 from drivers.bus.contract import Bus, FrameHandler
 from drivers.canopen.codes import NmtCommand
 from drivers.canopen.counters import CanopenCounters
@@ -101,7 +101,9 @@ class Master:
     # --- services ------------------------------------------------------------------------------------------------
 
     def sdo(self, node: int) -> SdoClient:
-        """The SDO client of a node; there is one a node."""
+        """The SDO client of a node; there is one a node. Raises UsageError for a node id outside 1 to 127."""
+        if not 1 <= node <= 127:
+            raise UsageError(f"{node} is no node id", node=node, limit="1 to 127", remedy="give a node id of 1 to 127")
         client = self._clients.get(node)
         if client is None:
             name, timeout_s = self.names.get(node, ""), self.network.sdo_timeout_s

@@ -8,7 +8,7 @@ import random
 import msgspec
 import pytest
 
-from canhelm.errors import NotReady
+from canhelm.errors import NotReady, UsageError
 from drivers.bus.contract import RTR_FLAG
 from drivers.contract import NodeState
 from drivers.epos.objects import OBJECTS
@@ -62,6 +62,13 @@ async def test_sync_is_an_empty_frame_with_identifier_0x80() -> None:
         b.port.taps.append(lambda can_id, data, _: frames.append((can_id, data)))
         await asyncio.sleep(0.015)
         assert (0x80, b"") in frames
+
+
+@pytest.mark.parametrize("node", [-1, 0, 128, 200])
+async def test_a_node_id_outside_1_to_127_has_no_sdo(node: int) -> None:
+    async with bench(powered=False) as b:
+        with pytest.raises(UsageError, match="no node id"):
+            b.master.sdo(node)
 
 
 async def test_a_scan_finds_every_node_and_no_other() -> None:

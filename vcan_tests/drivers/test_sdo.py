@@ -150,7 +150,7 @@ async def test_an_unknown_abort_code_is_given_as_a_number() -> None:
 
 async def test_a_silent_node_is_absent_after_the_time_out() -> None:
     server = Server()
-    with pytest.raises(NodeAbsent, match="node 3 .* did not answer within 250 ms"):
+    with pytest.raises(NodeAbsent, match=r"node 3 .* did not answer within 250 ms"):
         await server.client.read(STATUSWORD)
     assert asyncio.get_running_loop().time() == pytest.approx(0.25)
 
@@ -199,7 +199,7 @@ async def test_two_calls_at_once_wait_for_each_other() -> None:
 
     server.script = [reply, reply]
     values = await asyncio.gather(server.client.read(STATUSWORD), server.client.read(OBJECTS["controlword"]))
-    assert values == [0x6041, 0x6040]
+    assert list(values) == [0x6041, 0x6040]
 
 
 async def test_a_cancelled_call_leaves_the_queue_usable() -> None:
@@ -224,7 +224,7 @@ async def test_garbage_on_the_answer_id_is_counted_and_the_call_goes_on() -> Non
 async def test_a_value_of_the_wrong_length_is_a_device_fault() -> None:
     server = Server()
     server.script = [answer("43 41 60 00 37 03 00 00")]
-    with pytest.raises(DeviceFault, match="answered 4 bytes .* expected 2"):
+    with pytest.raises(DeviceFault, match=r"answered 4 bytes .* expected 2"):
         await server.client.read(STATUSWORD)
 
 
