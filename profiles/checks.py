@@ -9,10 +9,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from profiles.provenance import Mistake, Node, Path_, dotted, place_of
+from profiles.provenance import FieldPath, Mistake, Node, dotted, place_of
 from profiles.schema import SCHEMA_VERSION
 
-WHEEL_ROLES = ("rear right", "rear left", "front left", "front right")
 REFERENCES = {"wheels": "drives", "encoders": "encoders", "brakes": "brakes"}
 """Lists of names in ``vehicle`` and the part that defines the names."""
 STRONG_OUTPUT = 4
@@ -33,11 +32,11 @@ class Finding:
         other: path of a second place that belongs to it; its file:line is put where ``what`` says ``{other}``.
     """
 
-    path: Path_
+    path: FieldPath
     what: str
     remedy: str
     warning: bool = False
-    other: Path_ | None = None
+    other: FieldPath | None = None
 
     def located(self, tree: Node) -> Mistake:
         """The mistake with its file and line; of two places the one in the robot's own file is blamed."""
@@ -74,7 +73,7 @@ def _version(data: dict[str, Any]) -> Iterator[Finding]:
 
 
 def _node_ids(data: dict[str, Any]) -> Iterator[Finding]:
-    first: dict[int, Path_] = {}
+    first: dict[int, FieldPath] = {}
     for kind in ("drives", "encoders"):
         for name in part(data, kind):
             node, path = part(part(data, kind), name).get("node"), (kind, name, "node")
@@ -95,7 +94,7 @@ def _vehicle_names(data: dict[str, Any]) -> Iterator[Finding]:
                 yield Finding(path, f"{name!r} stands here twice", f"name each of {kind} once")
 
 
-def _unknown(path: Path_, kind: str, name: Any, known: dict[str, Any]) -> Finding:
+def _unknown(path: FieldPath, kind: str, name: Any, known: dict[str, Any]) -> Finding:
     return Finding(path, f"{kind} has no {name!r}", f"use one of: {', '.join(known) or f'({kind} is empty)'}")
 
 

@@ -84,16 +84,16 @@ class Mapping:
 
 
 Node: TypeAlias = Scalar | Listing | Mapping
-Path_: TypeAlias = tuple[str | int, ...]
+FieldPath: TypeAlias = tuple[str | int, ...]
 
 
-def dotted(path: Path_) -> str:
+def dotted(path: FieldPath) -> str:
     """``("vehicle", "wheels", 0)`` as ``vehicle.wheels[0]``."""
     text = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
     return text.removeprefix(".")
 
 
-def place_of(node: Node, path: Path_) -> Place:
+def place_of(node: Node, path: FieldPath) -> Place:
     """Place of the value at ``path``, or of the nearest thing around it that exists."""
     for step in path:
         if isinstance(node, Mapping) and step in node.entries:
@@ -114,7 +114,7 @@ def plain(node: Node) -> Any:
     return node.value
 
 
-def leaves(node: Node, path: Path_ = ()) -> list[tuple[str, Scalar]]:
+def leaves(node: Node, path: FieldPath = ()) -> list[tuple[str, Scalar]]:
     """Every scalar with its dotted path, in the order of the file."""
     if isinstance(node, Scalar):
         return [(dotted(path), node)]

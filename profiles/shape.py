@@ -9,7 +9,7 @@ from typing import Any
 
 from msgspec import inspect
 
-from profiles.provenance import Listing, Mapping, Mistake, Node, Path_, Place, Scalar, dotted, plain
+from profiles.provenance import FieldPath, Listing, Mapping, Mistake, Node, Place, Scalar, dotted, plain
 
 _NUMBERS = {inspect.IntType: "a whole number", inspect.FloatType: "a number"}
 
@@ -20,7 +20,7 @@ class Shape:
     def __init__(self, mistakes: list[Mistake]) -> None:
         self.mistakes = mistakes
 
-    def walk(self, node: Node, kind: inspect.Type, path: Path_ = ()) -> Any:
+    def walk(self, node: Node, kind: inspect.Type, path: FieldPath = ()) -> Any:
         """The plain value of ``node`` without unknown keys; wrong values stay in and are listed as mistakes."""
         if isinstance(kind, inspect.UnionType):
             kind = _member(node, kind)
@@ -32,14 +32,14 @@ class Shape:
             return self._tuple(node, kind, path)
         return self._scalar(node, kind, path)
 
-    def _wrong(self, place: Place, path: Path_, what: str, remedy: str) -> None:
+    def _wrong(self, place: Place, path: FieldPath, what: str, remedy: str) -> None:
         self.mistakes.append(Mistake(place, dotted(path), what, remedy))
 
-    def _not_a(self, node: Node, path: Path_, expected: str) -> Any:
+    def _not_a(self, node: Node, path: FieldPath, expected: str) -> Any:
         self._wrong(node.place, path, f"is {shown(node)}", f"write {expected}")
         return plain(node)
 
-    def _struct(self, node: Node, kind: inspect.StructType, path: Path_) -> Any:
+    def _struct(self, node: Node, kind: inspect.StructType, path: FieldPath) -> Any:
         fields = {field.encode_name: field for field in kind.fields}
         if not isinstance(node, Mapping):
             return self._not_a(node, path, f"a mapping with the keys {', '.join(fields)}")
@@ -51,7 +51,7 @@ class Shape:
         known = ((key, value) for key, value in node.entries.items() if key in fields)
         return {key: self.walk(value, fields[key].type, (*path, key)) for key, value in known}
 
-    def _dict(self, node: Node, kind: inspect.DictType, path: Path_) -> Any:
+    def _dict(self, node: Node, kind: inspect.DictType, path: FieldPath) -> Any:
         if not isinstance(node, Mapping) or len(node.entries) < (kind.min_length or 0):
             return self._not_a(node, path, expected(kind))
         for key in node.entries:
@@ -59,13 +59,13 @@ class Shape:
                 self._wrong(node.key_places[key], (*path, key), "is not a name", f"use {expected(kind.key_type)}")
         return {key: self.walk(value, kind.value_type, (*path, key)) for key, value in node.entries.items()}
 
-    def _tuple(self, node: Node, kind: inspect.TupleType, path: Path_) -> Any:
+    def _tuple(self, node: Node, kind: inspect.TupleType, path: FieldPath) -> Any:
         if not isinstance(node, Listing) or len(node.items) != len(kind.item_types):
             return self._not_a(node, path, expected(kind))
         pairs = enumerate(zip(node.items, kind.item_types, strict=True))
         return [self.walk(item, item_kind, (*path, index)) for index, (item, item_kind) in pairs]
 
-    def _scalar(self, node: Node, kind: inspect.Type, path: Path_) -> Any:
+    def _scalar(self, node: Node, kind: inspect.Type, path: FieldPath) -> Any:
         if not isinstance(node, Scalar) or not _fits(node.value, kind):
             return self._not_a(node, path, expected(kind))
         return node.value

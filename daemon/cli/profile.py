@@ -14,7 +14,7 @@ from cyclopts import App, Parameter
 from canhelm.errors import ConfigError, Refused, UsageError
 from daemon.cli.output import Json, say, show, wants_json, words
 from profiles.loader import CALIBRATION, SHIPPED, LoadedProfile, ProfileError, available, find, load
-from profiles.provenance import Path_, dotted
+from profiles.provenance import FieldPath, dotted
 from profiles.schema import SCHEMA_VERSION
 
 if TYPE_CHECKING:
@@ -153,7 +153,7 @@ def _rows(loaded: LoadedProfile) -> Iterator[dict[str, Any]]:
         yield {"field": field, "value": value, "assumed": field in loaded.assumed, "origin": origin}
 
 
-def _flat(value: Any, path: Path_ = ()) -> Iterator[tuple[str, Any]]:
+def _flat(value: Any, path: FieldPath = ()) -> Iterator[tuple[str, Any]]:
     if not isinstance(value, dict | list | tuple):
         yield dotted(path), value
         return
