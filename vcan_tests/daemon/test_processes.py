@@ -1,0 +1,212 @@
+"""A daemon and its command line as a person uses them: real processes, a real socket, real signals."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from canhelm.client import Client
+from canhelm.errors import CanhelmError
+
+TIMEOUT_S = 20
+DRIVE = ("drive", "parallel", "--angle", "0", "--speed", "0.4", "--duration", "30")
+
+
+class Bench:
+    """One running daemon with a simulated robot.
+
+    Attributes:
+        process: the daemon.
+        socket: its socket.
+        log: what it wrote to stderr.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.socket = folder / "robot.sock"
+        self.log = folder / "daemon.log"
+        arguments = ("run", "--simulate", "--profile", "max2d", "--socket", str(self.socket))
+        with self.log.open("w") as log:
+            self.process = subprocess.Popen([sys.executable, "-m", "daemon", *arguments], stderr=log, stdout=log)
+        self.client = self._connect()
+        self.wait_for(lambda status: status["state"] == "idle")
+
+    def _connect(self) -> Client:
+        deadline = time.monotonic() + TIMEOUT_S
+        while True:
+            try:
+                return Client(str(self.socket))
+            except CanhelmError:
+                if time.monotonic() > deadline or self.process.poll() is not None:
+                    raise AssertionError(self.log.read_text()) from None
+                os.sched_yield()
+
+    def environment(self) -> dict[str, str]:
+        """The environment of a person who works with this daemon."""
+        return {**os.environ, "CANHELM_SOCKET": str(self.socket)}
+
+    def canhelm(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """Run one command to its end."""
+        command = [sys.executable, "-m", "daemon", *arguments]
+        return subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, env=self.environment())
+
+    def begin(self, *arguments: str) -> subprocess.Popen[str]:
+        """Begin one command and go on."""
+        command = [sys.executable, "-m", "daemon", *arguments]
+        return subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=self.environment()
+        )
+
+    def drive(self) -> subprocess.Popen[str]:
+        """Begin to drive; returns when the robot is at speed."""
+        driving = self.begin(*DRIVE)
+        self.wait_for(lambda status: speeds(status)[0] > 0.38)
+        return driving
+
+    def status(self) -> dict[str, Any]:
+        """The daemon's status."""
+        status: dict[str, Any] = self.client.call("status")
+        return status
+
+    def wait_for(self, condition: Any) -> dict[str, Any]:
+        """Ask for the status until a condition holds."""
+        deadline = time.monotonic() + TIMEOUT_S
+        while not condition(status := self.status()):
+            assert time.monotonic() < deadline, status
+        return status
+
+
+def speeds(status: dict[str, Any]) -> list[float]:
+    return [abs(node["speed_m_s"]) for node in status["nodes"] if "speed_m_s" in node]
+
+
+def at_rest(status: dict[str, Any]) -> bool:
+    return max(speeds(status)) < 0.01
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+    bench = Bench(tmp_path_factory.mktemp("bench"))
+    yield bench
+    bench.client.close()
+    bench.process.send_signal(signal.SIGTERM)
+    assert bench.process.wait(TIMEOUT_S) == 0
+    assert "Traceback" not in bench.log.read_text()
+    assert not bench.socket.exists()
+
+
+def test_a_motor_is_enabled_turned_and_disabled_from_the_shell(bench: Bench) -> None:
+    assert bench.canhelm("motor", "enable", "1").returncode == 0
+    turned = bench.canhelm("motor", "velocity", "1", "-250", "--duration", "0.5")
+    assert turned.returncode == 0
+    assert json.loads(turned.stdout)["wheel_travel_m"] > 0.03
+    assert bench.canhelm("motor", "disable", "1").returncode == 0
+
+
+def test_status_piped_is_one_json_object(bench: Bench) -> None:
+    status = json.loads(bench.canhelm("status").stdout)
+    assert status["state"] == "idle"
+    assert len(status["nodes"]) == 6
+
+
+def test_a_brake_and_a_pair_are_moved_from_the_shell(bench: Bench) -> None:
+    assert bench.canhelm("brake", "release", "front").returncode == 0
+    assert bench.canhelm("brake", "engage", "front").returncode == 0
+    steered = json.loads(bench.canhelm("steer", "front", "20").stdout)
+    assert steered["steering_error_deg"] <= 0.2
+    assert bench.canhelm("steer", "front", "0").returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        (("motor", "velocity", "200", "10"), 2),
+        (("motor", "velocity", "99", "10", "--duration", "1"), 4),
+        (("drive", "rotate", "10"), 1),
+        (("steer", "front", "89"), 1),
+        (("drive", "parallel", "--angle", "0", "--speed", "9", "--duration", "1"), 1),
+    ],
+)
+def test_refused_commands_have_their_exit_codes(bench: Bench, arguments: tuple[str, ...], code: int) -> None:
+    refused = bench.canhelm(*arguments)
+    assert refused.returncode == code
+    assert refused.stderr.startswith("canhelm: ")
+    assert "Traceback" not in refused.stderr
+
+
+def test_ctrl_c_in_the_middle_of_a_drive_stops_the_robot(bench: Bench) -> None:
+    driving = bench.drive()
+    driving.send_signal(signal.SIGINT)
+    _, said = driving.communicate(timeout=TIMEOUT_S)
+    assert driving.returncode == 130
+    assert "stopped" in said
+    assert at_rest(bench.status())
+
+
+def test_a_suspended_command_loses_its_lease_and_the_robot_stops(bench: Bench) -> None:
+    driving = bench.drive()
+    driving.send_signal(signal.SIGSTOP)
+    bench.wait_for(at_rest)
+    driving.send_signal(signal.SIGCONT)
+    _, said = driving.communicate(timeout=TIMEOUT_S)
+    assert driving.returncode == 1
+    assert "lease" in said
+
+
+def test_a_killed_command_has_its_motion_stopped(bench: Bench) -> None:
+    driving = bench.drive()
+    driving.kill()
+    driving.communicate(timeout=TIMEOUT_S)
+    bench.wait_for(at_rest)
+
+
+def test_stop_works_from_another_shell_without_a_lease(bench: Bench) -> None:
+    driving = bench.drive()
+    assert bench.canhelm("stop").returncode == 0
+    assert at_rest(bench.status())
+    driving.communicate(timeout=TIMEOUT_S)
+    assert driving.returncode == 1
+
+
+def test_the_emergency_stop_is_latched_between_shells(bench: Bench) -> None:
+    assert bench.canhelm("estop").returncode == 0
+    assert bench.canhelm("steer", "front", "3").returncode == 6
+    bench.wait_for(at_rest)
+    assert bench.canhelm("reset").returncode == 0
+    assert bench.canhelm("steer", "front", "0").returncode == 0
+
+
+def test_a_drive_that_loses_power_stops_the_robot_and_one_reset_recovers(bench: Bench) -> None:
+    driving = bench.drive()
+    assert bench.canhelm("sim", "power", "3", "off").returncode == 0
+    bench.wait_for(lambda status: status["state"] == "fault" and at_rest(status))
+    assert bench.canhelm("sim", "power", "3", "on").returncode == 0
+    _, said = driving.communicate(timeout=TIMEOUT_S)
+    assert driving.returncode == 1
+    assert "front_left" in said
+    bench.wait_for(lambda status: all(node["node_state"] == "ready" for node in status["nodes"]))
+    assert json.loads(bench.canhelm("reset").stdout)["state"] == "idle"
+    again = bench.canhelm("drive", "parallel", "--angle", "0", "--speed", "0.3", "--duration", "0.5")
+    assert again.returncode == 0
+
+
+def test_without_a_daemon_the_exit_code_is_three(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "daemon", "status", "--socket", str(tmp_path / "none.sock")]
+    alone = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S)
+    assert alone.returncode == 3
+    assert "canhelm run" in alone.stderr
+
+
+def test_virtual_time_with_a_socket_is_refused() -> None:
+    command = [sys.executable, "-m", "daemon", "run", "--simulate", "--profile", "max2d", "--virtual-time"]
+    refused = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S)
+    assert refused.returncode == 2
+    assert "virtual time" in refused.stderr
