@@ -72,7 +72,7 @@ class SimulatedEpos(SimulatedNode):
     ) -> None:
         dictionary = SimulatedDictionary(OBJECTS, config.node, FACTORY, VOLATILE)
         self.on_power_stage: Callable[[bool], None] = lambda _: None
-        self.motion = Motion(config, axis, self.trigger_fault, self._ramp_ended)
+        self.motion = Motion(config, axis, self._fault, self._ramp_ended)
         self.homing = Homing(self.motion)
         self.motion.homing = self.homing
         self.control = DeviceControl(self)
@@ -104,6 +104,7 @@ class SimulatedEpos(SimulatedNode):
     def set_supply_voltage(self, voltage_v: float) -> None:
         """Change the supply voltage as the drive measures it; outside its range the drive faults until it is back."""
         self._supply_v = voltage_v
+        self.before_access(asyncio.get_running_loop().time())
         if self.control.state is not State.START:
             self._watch_supply()
 
@@ -111,7 +112,8 @@ class SimulatedEpos(SimulatedNode):
         low, high = _SUPPLY_RANGE_V
         for code, present in ((_UNDER_VOLTAGE, self._supply_v < low), (_OVER_VOLTAGE, self._supply_v > high)):
             if present and code not in self.control.causes:
-                self.trigger_fault(code, lasting=True)
+                self.control.causes.add(code)
+                self._fault(code)
             elif not present:
                 self.clear_cause(code)
 
@@ -124,14 +126,10 @@ class SimulatedEpos(SimulatedNode):
 
         A drive that is off or boots has no faults.
         """
-        if self.control.state is State.START:
-            return
-        entry = EMERGENCIES[code]
-        if lasting:
+        self.before_access(asyncio.get_running_loop().time())
+        if lasting and self.control.state is not State.START:
             self.control.causes.add(code)
-        self.control.fault(entry.reaction or "D")
-        self.outputs.refresh()
-        self.emergency(code, self.error_register | (entry.register or 1))
+        self._fault(code)
 
     def clear_cause(self, code: int) -> None:
         """Let the cause of a fault go away; the drive still has to be reset."""
@@ -165,7 +163,15 @@ class SimulatedEpos(SimulatedNode):
 
     def master_lost(self) -> None:
         """Life guarding: the master is gone."""
-        self.trigger_fault(_LIFE_GUARDING)
+        self._fault(_LIFE_GUARDING)
+
+    def _fault(self, code: int) -> None:
+        if self.control.state is State.START:
+            return
+        entry = EMERGENCIES[code]
+        self.control.fault(entry.reaction or "D")
+        self.outputs.refresh()
+        self.emergency(code, self.error_register | (entry.register or 1))
 
     # Power stage, for device control
 
@@ -252,7 +258,7 @@ class SimulatedEpos(SimulatedNode):
         before, self._sensor = self._sensor, self._settings.sensor
         self._settings.take_parameters()
         if self._sensor != before:
-            self.trigger_fault(_SENSOR)
+            self._fault(_SENSOR)
 
     def _recompute_cob_ids(self, _: int) -> None:
         """Give the PDOs the identifiers of the node id; they act after saving and a restart."""
@@ -262,7 +268,7 @@ class SimulatedEpos(SimulatedNode):
                 self.dictionary.values[index + n, 1] = base + 0x100 * n + self.node_id
 
     def _limit_switch(self, function: int) -> None:
-        self.trigger_fault(_LIMIT_SWITCHES[function - NEGATIVE_LIMIT])
+        self._fault(_LIMIT_SWITCHES[function - NEGATIVE_LIMIT])
 
     def _capture(self) -> None:
         self._measurements.captured_qc = self.motion.counts

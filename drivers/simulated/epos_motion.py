@@ -114,7 +114,7 @@ class Motion:
         self.powered = self.halted = self.acknowledged = self.following_error = False
         self._raise_fault = raise_fault
         self._ramp_ended = ramp_ended
-        self._stopping = False
+        self._stopping = self._set_point_bit = False
         self._zero_qc = 0
         self._law: Law = self._no_demand
         self._set_point: SetPoint | None = None
@@ -232,6 +232,7 @@ class Motion:
 
         While one set-point waits, another that is not to be taken at once is not acknowledged.
         """
+        self._set_point_bit = True
         parameters = self.parameters
         speed = min(parameters.profile_speed, parameters.max_speed)
         point = SetPoint(position_qc, relative, speed, parameters.acceleration, parameters.deceleration)
@@ -244,6 +245,7 @@ class Motion:
 
     def clear_set_point_bit(self) -> None:
         """The set-point bit is 0: the acknowledge falls as soon as no set-point waits."""
+        self._set_point_bit = False
         if self._next is None:
             self.acknowledged = False
 
@@ -301,6 +303,7 @@ class Motion:
         if self._set_point is not None and self.profile.arrived:
             self._set_point = None
             if self._next is not None:
+                self.acknowledged = self._set_point_bit
                 self._begin(self._next)
         if self._stopping:
             return self._brake(speed, position, dt_s)

@@ -18,6 +18,7 @@ _LOAD_FACTOR = 10.0
 _POSITION_GAIN_PER_S = 10.0
 _COOLED = 0.9
 """Share of the continuous current's heat below which the output current limit is allowed again (assumed)."""
+_SAME_RAD = 1e-9
 
 
 class SpeedRamp:
@@ -84,8 +85,11 @@ class PositionProfile:
         faster = speed * wanted >= 0.0 and abs(wanted) > abs(speed)
         change = (self.up if faster else self.down) * dt_s
         new = min(speed + change, wanted) if wanted > speed else max(speed - change, wanted)
-        if not halted and abs(way) <= braking * dt_s and abs(new) <= braking:
-            self.position, new, self.arrived = self.end, 0.0, True
+        reaching = 0.0 < abs(way) <= abs(new) * dt_s and abs(new) <= 1.01 * braking
+        if reaching and not (halted or self.arrived):
+            self.position, new = self.end, way / dt_s
+        elif new == 0.0 and abs(way) < _SAME_RAD:
+            self.position, self.arrived = self.end, True
         else:
             self.position += new * dt_s
         self.slope = (new - speed) / dt_s

@@ -161,18 +161,27 @@ class Bench:
     async def booted(cls, node: int = 1) -> Bench:
         """A bench whose drive has power and has sent its boot-up message."""
         bench = cls(node)
+        bench.watch()
         bench.epos.power_on()
         await asyncio.sleep(0.06)
         return bench
 
+    def watch(self) -> None:
+        """Look at the world every 10 ms, as a network does."""
+        loop = asyncio.get_running_loop()
+        self.world.advance(loop.time())
+        loop.call_later(0.01, self.watch)
+
     @property
     def rpm(self) -> float:
         """True speed of the shaft."""
+        self.world.advance(asyncio.get_running_loop().time())
         return self.world.axes["bench"].speed_rad_s * 60.0 / tau
 
     @property
     def qc(self) -> float:
         """True angle of the shaft in quad counts."""
+        self.world.advance(asyncio.get_running_loop().time())
         return self.world.axes["bench"].position_rad / tau * 2000.0
 
     async def u8(self, index: int, sub: int, value: int) -> int:
