@@ -188,15 +188,15 @@ class DriveMove(Motion):
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """Watch the drive: over when its target is reached, its time is out or it was stopped."""
+        cut_short = bool(self.stop_reason)
         if self._remaining_s is not None:
             self._remaining_s -= dt_s
-            over = self._remaining_s <= 0.0
-        else:
-            self._settled = self._settled + 1 if self._drive.at_target and not self._until_stopped else 0
-            over = self._settled >= self.SETTLE_CYCLES
-        if over or self.stop_reason:
-            if self.stop_reason:
-                self._drive.quick_stop()
+            cut_short = cut_short or self._remaining_s <= 0.0
+        elif not self._until_stopped:
+            self._settled = self._settled + 1 if self._drive.at_target else 0
+        if cut_short:
+            self._drive.quick_stop()
+        if cut_short or self._settled >= self.SETTLE_CYCLES:
             self.finish({"position_m": round(self._drive.position_m, 6)})
         return self._zero
 

@@ -51,7 +51,7 @@ class MotorCommands:
     async def _disable(self, params: Params, lease: str | None) -> dict[str, Any]:
         drive = self._present(params)
         await self._end_motions_of(drive)
-        await drive.disable()
+        await self._supervisor.power_off(drive)
         return drive.status()
 
     async def _velocity(self, params: Params, lease: str | None) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from typing import Any
 
 from canhelm.errors import CanhelmError, DeviceFault, EmergencyStop, NotReady, Refused
 from daemon.loops.measurement import Command, Measurement
+from daemon.runtime.brakes import BrakeKeeper
 from daemon.runtime.events import EventLog
 from daemon.runtime.leases import Leases
 from daemon.runtime.motions import Motion
@@ -22,7 +23,7 @@ from daemon.runtime.tasks import TaskSet
 from daemon.runtime.vehicles import Vehicle
 from daemon.runtime.watch import DeviceWatch
 from drivers.canopen.master import Master, NodeEvent
-from drivers.contract import BrakeState, Device, Drive, DriveState, NodeState
+from drivers.contract import Device, Drive, DriveState, NodeState
 from drivers.devices import Devices
 
 LOGGER = logging.getLogger("canhelm")
@@ -73,7 +74,7 @@ class Supervisor:
         self._estop_reason = ""
         self._fault: DeviceFault | None = None
         self._halting = 0
-        self._all_engaged = (False,) * len(vehicle.brakes)
+        self.brakes = BrakeKeeper(devices, vehicle.brakes, self._tasks, self.fault)
         master.on_event = self._on_node_event
 
     # --- state -------------------------------------------------------------------------------------------------
@@ -147,6 +148,7 @@ class Supervisor:
                     f"motion {other.identity} ({other.kind}, {holder}) is running",
                     remedy="wait for it, or `canhelm stop`",
                 )
+        self.brakes.require_released(motion.drives)
         self.vehicle.require_free(motion)
         motion.identity = str(next(self._numbers))
         self.motions[motion.identity] = motion
@@ -176,7 +178,7 @@ class Supervisor:
                 continue
             try:
                 if drive in enabled_here or self._fault is not None or self._estop_reason:
-                    await drive.disable()
+                    await self.power_off(drive)
                 elif drive.state is not DriveState.ENABLED:
                     await drive.enable()
                 else:
@@ -218,7 +220,8 @@ class Supervisor:
 
     async def reset(self) -> dict[str, Any]:
         """Clear the latched emergency stop and faults. Raises DeviceFault where a cause is still there."""
-        await self._settled()
+        if self._fault is not None or self._estop_reason:
+            await self._settled()
         for drive in self.devices.drives.values():
             if drive.node_state is NodeState.READY and drive.state is DriveState.FAULT:
                 await drive.reset_fault()
@@ -239,7 +242,7 @@ class Supervisor:
         self.command = self.vehicle.zero
         for motion in list(self.motions.values()):
             motion.fail(error)
-        self.want_brakes(self._all_engaged)
+        self.brakes.on_halt()
 
     async def _stop_and_disable(self) -> None:
         self._halting += 1
@@ -247,9 +250,14 @@ class Supervisor:
             await self._settled()
             for drive in self.devices.drives.values():
                 if drive.node_state is NodeState.READY and drive.state in (DriveState.QUICK_STOP, DriveState.ENABLED):
-                    await self._try(drive.name, drive.disable())
+                    await self._try(drive.name, self.power_off(drive))
         finally:
             self._halting -= 1
+
+    async def power_off(self, drive: Drive) -> None:
+        """Engage what holds the axis, then switch the drive off. Raises NotReady or Timeout."""
+        await self.brakes.secure(drive.name)
+        await drive.disable()
 
     async def _settled(self) -> None:
         await self.until_rest()
@@ -279,7 +287,7 @@ class Supervisor:
         self._watch_devices(now_s)
         wanted = self._ask_motions(measurement, dt_s)
         if wanted.release_brake:
-            self.want_brakes(wanted.release_brake)
+            self.brakes.follow(wanted.release_brake)
         self.command, self.active_limits = self.vehicle.gate(wanted, measurement, self.command, dt_s)
         deadline = now_s + self._period_s
         for drive, speed in zip(self.vehicle.drives, self.command.wheel_speed_m_s, strict=True):
@@ -350,25 +358,6 @@ class Supervisor:
             if motion.lease == lease and not motion.stop_reason:
                 self.log.add("warning", "supervisor", f"motion {motion.identity} ({motion.kind}) stops: {reason}")
                 motion.stop(reason)
-
-    # --- brakes ------------------------------------------------------------------------------------------------
-
-    def want_brakes(self, release: tuple[bool, ...]) -> None:
-        """Make the vehicle's brakes follow what is wanted; a brake that does not obey is a fault."""
-        for brake, wanted in zip(self.vehicle.brakes, release, strict=True):
-            moving_there = (
-                (BrakeState.RELEASED, BrakeState.RELEASING) if wanted else (BrakeState.ENGAGED, BrakeState.ENGAGING)
-            )
-            if brake.state not in moving_there:
-                self._tasks.spawn(self._switch(brake.release() if wanted else brake.engage(), brake.name), "brake")
-
-    async def _switch(self, switching: Coroutine[Any, Any, None], name: str) -> None:
-        try:
-            await switching
-        except CanhelmError as error:
-            self.fault(
-                DeviceFault(f"the {name} brake did not switch: {error.message}", node=error.node, remedy=error.remedy)
-            )
 
     # --- the end -----------------------------------------------------------------------------------------------
 

@@ -70,9 +70,13 @@ class Max2dWorld:
         self._front = Pair(vehicle, simulation, 1, front_right, front_left)
         self.pairs = dict(zip(vehicle.encoders, (self._rear, self._front), strict=True))
         """Wheel pairs by the names of their encoders."""
-        self._braked = dict(zip(vehicle.brakes, (self._rear, self._front), strict=True))
-        for name, pair in self._braked.items():
-            pair.set_brake(engaged=profile.brakes[name].energise_to_release)
+        steering = dict(zip(vehicle.brakes, (self._rear, self._front), strict=True))
+        self._braked: dict[str, Pair | WheelDrive] = {
+            name: steering[name] if brake.kind == "steering" else self.wheels[brake.drive].drive
+            for name, brake in profile.brakes.items()
+        }
+        for name, brake in profile.brakes.items():
+            self._braked[name].set_brake(engaged=brake.energise_to_release)
         self._drives = tuple(wheel.drive for wheel in self.wheels.values())
         self._place_body(vehicle, start)
         self._step_s = step_s
@@ -143,7 +147,7 @@ class Max2dWorld:
         self.pairs[pair].place(heading_rad)
 
     def set_brake(self, name: str, engaged: bool) -> None:
-        """Engage or release a steering brake from the last advanced time on."""
+        """Engage or release a brake from the last advanced time on."""
         self._braked[name].set_brake(engaged)
         self._quiet_steps = 0
 

@@ -33,8 +33,10 @@ class WheelDrive:
 
     __slots__ = (
         "_back_loss",
+        "_brake_n_m",
         "_dry_n_m",
         "_forward_loss",
+        "_friction_n_m",
         "_per_inertia",
         "_radius_m",
         "_resistance_ohm",
@@ -63,7 +65,9 @@ class WheelDrive:
         self._shaft_per_wheel = config.direction * ratio
         self._wheel_torque_per_a = config.direction * ratio * motor.torque_constant_n_m_a
         self._per_inertia = 1.0 / (simulation.wheel_inertia_kg_m2 + ratio * ratio * motor.rotor_inertia_kg_m2)
-        self._dry_n_m = ratio * motor.torque_constant_n_m_a * motor.no_load_current_a
+        self._friction_n_m = ratio * motor.torque_constant_n_m_a * motor.no_load_current_a
+        self._brake_n_m = simulation.brake_holding_torque_n_m
+        self._dry_n_m = self._friction_n_m
         self._rolling_m = simulation.tyre.rolling_resistance * config.wheel_radius_m
         self._forward_loss = 1.0 - config.gear_efficiency
         self._back_loss = 1.0 / config.gear_efficiency - 1.0
@@ -115,6 +119,10 @@ class WheelDrive:
         least = (-self._supply_v - back_emf) / self._resistance_ohm
         demand = self.demand_a
         return least if demand < least else most if demand > most else demand
+
+    def set_brake(self, engaged: bool) -> None:
+        """Engage or release a holding brake on the wheel."""
+        self._dry_n_m = self._friction_n_m + (self._brake_n_m if engaged else 0.0)
 
     def stop(self) -> None:
         """Bring the wheel to rest at once."""

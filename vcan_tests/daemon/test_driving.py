@@ -71,6 +71,16 @@ async def test_a_profile_position_move_turns_the_motor_by_its_counts() -> None:
         assert turned == pytest.approx(10_000 / 2000 * math.tau, abs=relaxed_rad)
 
 
+async def test_a_current_for_a_time_turns_the_wheel_and_ends_at_rest() -> None:
+    async with running_robot() as robot:
+        begin = asyncio.get_running_loop().time()
+        result = await robot.call("motor.current", node=1, current_ma=-2600.0, duration_s=0.6)
+        assert result["position_m"] > 0.005
+        assert asyncio.get_running_loop().time() - begin < 1.7
+        assert robot.fastest_wheel_m_s < 0.01
+        assert robot.app.devices.drives["rear_right"].state == "disabled"
+
+
 async def test_a_stream_of_values_drives_and_a_stale_one_stops() -> None:
     async with running_robot() as robot:
         for _ in range(80):
