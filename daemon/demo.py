@@ -45,6 +45,14 @@ class Figure:
     duration_s: float
     published: dict[str, float]
 
+    @property
+    def words(self) -> str:
+        """The manoeuvre in words."""
+        if self.move == "parallel":
+            return f"parallel movement at {self.rear_deg:g}° with {self.speed_m_s:g} m/s for {self.duration_s:g} s"
+        headings = f"rear {self.rear_deg:.2f}°, front {self.front_deg:.2f}°"
+        return f"turn with {headings} at {self.speed_m_s:g} m/s for {self.duration_s:g} s"
+
     def request(self) -> tuple[str, dict[str, Any]]:
         """Method and parameters that drive it."""
         common = {"speed_m_s": self.speed_m_s, "duration_s": self.duration_s}
@@ -100,12 +108,22 @@ class Demo:
         seed: of everything random in the simulated network.
         record: folder for the candump log, or None.
         tell: called with a sentence at each step of the demo.
+        watch: called once a control cycle, for a live view.
     """
 
-    def __init__(self, profile: Profile, seed: int, record: Path | None, tell: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        profile: Profile,
+        seed: int,
+        record: Path | None,
+        tell: Callable[[str], None],
+        watch: Callable[[App], None] | None = None,
+    ) -> None:
         if not isinstance(profile.vehicle, PairedSteerGeometry):
             raise UsageError(f"profile {profile.name} has no paired steering", remedy="the demo drives max2d")
-        self.app = App(profile, seed=seed, record=record)
+        self.app = app = App(profile, seed=seed, record=record)
+        if watch is not None:
+            app.supervisor.observers.append(lambda: watch(app))
         self._geometry = profile.vehicle
         self._tell = tell
 
@@ -150,7 +168,7 @@ class Demo:
         method, parameters = figure.request()
         lease = app.service.open_lease("demo")
         renewing = loop.create_task(self._renew(lease))
-        self._tell(f"figure {figure.identity}: {method} {parameters}")
+        self._tell(f"figure {figure.identity}: {figure.words}")
         try:
             result = await app.service.call(method, parameters, lease)
         finally:

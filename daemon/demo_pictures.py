@@ -25,7 +25,7 @@ WHEEL_LENGTH_M = 0.2
 
 def draw(result: FigureResult, geometry: PairedSteerGeometry, folder: Path) -> Path:
     """Draw one figure into ``folder``; returns the PNG's path."""
-    figure, axes = plt.subplots(2, 2, figsize=(12, 9), layout="constrained")
+    figure, axes = plt.subplots(2, 2, figsize=(13, 9), layout="constrained")
     identity, achieved = result.figure.identity, result.numbers["achieved"]
     figure.suptitle(
         f"Figure {identity} of the MAX2D thesis: {result.figure.move}, {result.figure.speed_m_s:g} m/s, "
@@ -51,7 +51,7 @@ def _trajectory(axes: Any, result: FigureResult, geometry: PairedSteerGeometry) 
     _reference(axes, result)
     axes.set(title="trajectory", xlabel="x [m]", ylabel="y [m]", aspect="equal")
     axes.grid(visible=True, alpha=0.3)
-    axes.legend(loc="best", fontsize="small")
+    axes.legend(loc="center left", bbox_to_anchor=(1.02, 0.5), fontsize="small")
 
 
 def _outline(axes: Any, pose: Any, heading_rad: tuple[float, ...], geometry: PairedSteerGeometry) -> None:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import importlib.util
-import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from canhelm.errors import UsageError
+from daemon.cli.demo_view import DemoView
 from daemon.cli.output import Json, say, show
 
 if TYPE_CHECKING:
@@ -51,38 +50,16 @@ def demo(
     robot = load(profile).profile
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
-    with _teller() as tell:
+    with DemoView(every=100 if virtual_time else 10) as view:
 
         async def drive() -> list[FigureResult]:
-            return await Demo(robot, seed, out, tell).run(figures)
+            return await Demo(robot, seed, out, view.tell, view.watch).run(figures)
 
         results = run_virtual(drive()) if virtual_time else asyncio.run(drive())
     show([result.numbers for result in results], lambda _: _table(results), json)
     if out is not None:
         _draw(results, robot.vehicle, out)
     return 0
-
-
-class _teller:
-    """A live line on a terminal, plain sentences elsewhere; on stderr."""
-
-    def __enter__(self) -> Callable[[str], None]:
-        self._status: Any = None
-        if sys.stderr.isatty():
-            from daemon.cli.output import console
-
-            self._status = console(stderr=True).status("starting")
-            self._status.__enter__()
-            return self._tell
-        return say
-
-    def _tell(self, sentence: str) -> None:
-        self._status.console.print(f"· {sentence}")
-        self._status.update(sentence)
-
-    def __exit__(self, *error: object) -> None:
-        if self._status is not None:
-            self._status.__exit__(*error)
 
 
 def _table(results: list[FigureResult]) -> Table:
