@@ -237,10 +237,11 @@ class NodeBoot:
         self._leave("lost", message, "check its motor power and the CAN cable; it is configured again when it is back")
 
     def _leave(self, kind: str, message: str, remedy: str) -> None:
-        """The node was ready and is no longer."""
+        """The node was ready and is no longer. One that is held by command is guarded on, for it guards its life."""
         device = self._device
         self._master.counters.nodes_lost += 1
-        self._guard.disarm()
+        if not self._held:
+            self._guard.disarm()
         self._gone.set()
         device.fault = device.make_fault(0, message, remedy)
         device.node_state = NodeState.ABSENT

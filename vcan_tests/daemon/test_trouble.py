@@ -142,3 +142,23 @@ async def test_garbage_on_the_bus_is_counted_and_shown() -> None:
         assert bus["malformed"] + bus["unknown"] + bus["late_answers"] >= 5
         await robot.call("steer", pair="front", angle_deg=5.0)
         await stranger.close()
+
+
+@pytest.mark.parametrize("command", ["preop", "stop"])
+async def test_a_node_held_by_command_comes_back_by_command_without_a_fault(command: str) -> None:
+    async with running_robot(expect_errors=True) as robot:
+        await robot.call("nmt", command=command, node=3)
+        await asyncio.sleep(2.0)
+        assert robot.state == "waiting"
+        assert "nmt start front_left" in robot.app.service.status()["message"]
+        await robot.call("nmt", command="start", node=3)
+        await robot.until(lambda: robot.state == "idle", 3.0)
+
+
+async def test_a_reset_of_a_healthy_robot_does_not_wait_for_its_motion() -> None:
+    async with running_robot() as robot:
+        motion = await robot.call("drive.parallel", angle_deg=0.0, speed_m_s=0.2, duration_s=5.0, wait=False)
+        begin = asyncio.get_running_loop().time()
+        await robot.call("reset")
+        assert asyncio.get_running_loop().time() == begin
+        await robot.call("motion.stop", motion=motion["motion"])
