@@ -56,6 +56,7 @@ class SimulatedDictionary:
         node_id: added to the defaults that depend on it.
         factory: values by name in place of the table's defaults.
         volatile: names of writable objects that saving leaves out (commands and set values).
+        kept: names of read-only objects that saving includes.
 
     Attributes:
         values: present value by (index, sub-index); live values stand in ``readers`` instead.
@@ -65,14 +66,20 @@ class SimulatedDictionary:
     """
 
     def __init__(
-        self, table: ObjectTable, node_id: int, factory: dict[str, Value], volatile: Iterable[str] = ()
+        self,
+        table: ObjectTable,
+        node_id: int,
+        factory: dict[str, Value],
+        volatile: Iterable[str] = (),
+        kept: Iterable[str] = (),
     ) -> None:
         self.table = table
         self.node_id = node_id
         self.objects = {(o.index, o.sub): o for o in table.objects if o.firmware == "2011h"}
         self._indices = {index for index, _ in self.objects}
         self._factory = {address: self._default(entry, factory) for address, entry in self.objects.items()}
-        self._volatile = {self.address(name) for name in volatile}
+        writable = {address for address, entry in self.objects.items() if entry.access is Access.RW}
+        self._parameters = writable - {self.address(n) for n in volatile} | {self.address(n) for n in kept}
         self._stored: dict[Address, Value] = {}
         self.values = dict(self._factory)
         self.readers: dict[Address, Callable[[], Value]] = {}
@@ -143,8 +150,7 @@ class SimulatedDictionary:
 
     def save(self) -> None:
         """Copy all parameters to the non-volatile memory."""
-        writable = (a for a, o in self.objects.items() if o.access is Access.RW and a not in self._volatile)
-        self._stored = {address: self.values[address] for address in writable}
+        self._stored = {address: self.values[address] for address in self._parameters}
 
     def commission(self, values: dict[str, Value]) -> None:
         """Put values by name into the non-volatile memory, as somebody who set the device up left them."""

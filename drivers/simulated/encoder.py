@@ -82,7 +82,7 @@ class SimulatedEncoder(SimulatedNode):
             "single_turn_resolution": config.counts_per_turn,
             "number_of_turns": turns,
         }
-        dictionary = SimulatedDictionary(OBJECTS, config.node, factory, ("preset_value",))
+        dictionary = SimulatedDictionary(OBJECTS, config.node, factory, ("preset_value",), ("offset_value",))
         self._config = config
         self._pair = pair
         self._world = world
@@ -141,9 +141,7 @@ class SimulatedEncoder(SimulatedNode):
             raise SdoAbort(TOO_HIGH)
 
     def _preset(self, value: int) -> None:
-        range_counts = self._range()
-        offset = (value - self._raw() + range_counts // 2) % range_counts - range_counts // 2
-        self.dictionary.values[self.dictionary.address("offset_value")] = offset
+        self.dictionary.values[self.dictionary.address("offset_value")] = value - self._raw() % self._range()
 
     # Alarms
 
