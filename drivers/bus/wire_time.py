@@ -83,14 +83,14 @@ def frame_bits(can_id: int, data: bytes) -> int:
     state, crc = _header(can_id, len(data))
     if can_id & RTR_FLAG:
         data = b""
-    stuffed = state & 0xFF
+    counts = state  # in its low byte, which no 8 data bytes make overflow
     for byte in data:
         crc = (crc << 8 & _CRC_MASK) ^ _CRC_OF_BYTE[crc >> 7 ^ byte]
         state = _STUFF_8[state & 0xF00 | byte]
-        stuffed += state & 0xFF
+        counts += state
     state = _STUFF_8[state & 0xF00 | crc >> 7]
-    stuffed += (state & 0xFF) + (_STUFF_7[state & 0xF00 | crc & 0x7F] & 0xFF)
-    return _HEADER_BITS + 8 * len(data) + _CRC_BITS + _UNSTUFFED_BITS + stuffed
+    counts += state + _STUFF_7[state & 0xF00 | crc & 0x7F]
+    return _HEADER_BITS + 8 * len(data) + _CRC_BITS + _UNSTUFFED_BITS + (counts & 0xFF)
 
 
 class LoadMeter:
@@ -112,8 +112,11 @@ class LoadMeter:
         """Count a frame of ``bits`` that ended at ``end_s``; frames come in the order of their times."""
         self.total_bits += bits
         self._recent_bits += bits
-        self._recent.append((end_s, bits))
-        self._forget(end_s - 1.0)
+        recent = self._recent
+        recent.append((end_s, bits))
+        before_s = end_s - 1.0
+        while recent[0][0] <= before_s:  # as _forget does, without a call a frame
+            self._recent_bits -= recent.popleft()[1]
 
     def load(self, now_s: float) -> float:
         """Load over the second before ``now_s``, 0 to 1."""

@@ -158,7 +158,8 @@ class SimulatedBus:
         """Queue a frame of ``port`` as of now: the loop's time, or the stamp of the frame being delivered."""
         bits = frame_bits(can_id, data)
         now = self._end_s if self._delivering else asyncio.get_running_loop().time()
-        if not self._admits(port, now):
+        fits = port.attached and port.connected and port.queued < port.depth
+        if not (fits or self._admits(port, now)):
             return
         port.queued += 1
         if port.queued > port.queue_high_water:
@@ -203,22 +204,20 @@ class SimulatedBus:
 
     def _begin_next(self, start_s: float) -> None:
         """Put the most urgent frame on the wire at ``start_s`` or, where none is queued by then, as soon as one is."""
+        queue, behind = self._queue, self._behind
         while True:
-            while self._behind and self._behind[0][0] <= start_s:
-                heappush(self._queue, self._behind.popleft()[1])
-            if self._queue:
-                queued = heappop(self._queue)
+            while behind and behind[0][0] <= start_s:
+                heappush(queue, behind.popleft()[1])
+            if queue:
+                queued = heappop(queue)
                 if queued[5] >= start_s and queued[6].connected:
-                    self._begin(queued, start_s)
-                    return
+                    break
                 self._drop(queued)
-            elif self._behind:
-                start_s = self._behind[0][0]
+            elif behind:
+                start_s = behind[0][0]
             else:
                 self._current = None
                 return
-
-    def _begin(self, queued: _Queued, start_s: float) -> None:
         bits = queued[4]
         self._current = queued
         self._start_s = start_s
@@ -236,16 +235,17 @@ class SimulatedBus:
         """Deliver every frame whose stamp has passed; always at least the one that the timer was set for."""
         self._timer = None
         self._delivering = True
-        now = max(asyncio.get_running_loop().time(), self._end_s)
-        while self._current is not None and self._end_s <= now:
+        loop = asyncio.get_running_loop()
+        now = max(loop.time(), self._end_s)
+        while (sent := self._current) is not None and self._end_s <= now:
             if self._disturbed and self._random.random() < self._disturbed:
-                self._repeat(self._current)
+                self._repeat(sent)
             else:
-                self._complete(self._current)
+                self._complete(sent)
             self._begin_next(self._free_s)
         self._delivering = False
-        if self._current is not None:
-            self._arm()
+        if sent is not None:
+            self._timer = loop.call_at(self._end_s, self._on_frame_end)
 
     def _repeat(self, destroyed: _Queued) -> None:
         """Signal an error and let the frame take part in the next arbitration again."""
@@ -264,7 +264,10 @@ class SimulatedBus:
             return
         sender.counters.sent += 1
         self.frames[can_id] += 1
-        self._show_to_taps(can_id, data)
+        end_s = self._end_s
+        for port in self._ports:
+            if port.taps and port.connected:
+                self._show_to_taps(port, can_id, data)
         route = self._routes.get(can_id)
         if route is None:
             route = self._routes[can_id] = self._find_route(can_id & ID_MASK)
@@ -274,18 +277,16 @@ class SimulatedBus:
                 continue
             port.counters.received += 1
             try:
-                receiver(can_id, data, self._end_s)
+                receiver(can_id, data, end_s)
             except Exception as error:  # noqa: BLE001 - one participant's mistake must not stop the wire
                 self._report(port, error)
 
-    def _show_to_taps(self, can_id: int, data: bytes) -> None:
-        for port in self._ports:
-            if port.taps and port.connected:
-                for tap in tuple(port.taps):
-                    try:
-                        tap(can_id, data, self._end_s)
-                    except Exception as error:  # noqa: BLE001 - a listener's mistake must not stop the wire
-                        self._report(port, error)
+    def _show_to_taps(self, port: SimulatedPort, can_id: int, data: bytes) -> None:
+        for tap in tuple(port.taps):
+            try:
+                tap(can_id, data, self._end_s)
+            except Exception as error:  # noqa: BLE001 - a listener's mistake must not stop the wire
+                self._report(port, error)
 
     def _find_route(self, number: int) -> tuple[SimulatedPort, ...]:
         return tuple(port for port in self._ports if port.accepted is None or number in port.accepted)
