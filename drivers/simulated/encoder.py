@@ -141,7 +141,9 @@ class SimulatedEncoder(SimulatedNode):
             raise SdoAbort(TOO_HIGH)
 
     def _preset(self, value: int) -> None:
-        self.dictionary.values[self.dictionary.address("offset_value")] = value - self._raw() % self._range()
+        counts = self._range()
+        offset = (value - self._raw() + counts // 2) % counts - counts // 2
+        self.dictionary.values[self.dictionary.address("offset_value")] = offset
 
     # Alarms
 

@@ -56,8 +56,8 @@ class Measurements:
             "hall_sensor_pattern": self._hall_pattern,
             "system_state": lambda: _ROTOR_KNOWN | (_CURRENT_LIMITED if motion.regulator.limited else 0),
             "captured_position": lambda: _int32(self.captured_qc),
-            "analog_input_1": lambda: self.analog_mv[0],
-            "analog_input_2": lambda: self.analog_mv[1],
+            "analog_input_1": lambda: _int16(self.analog_mv[0]),
+            "analog_input_2": lambda: _int16(self.analog_mv[1]),
         }
 
     def _rpm(self, speed_rad_s: float) -> int:

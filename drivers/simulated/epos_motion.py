@@ -116,7 +116,7 @@ class Motion:
         self._ramp_ended = ramp_ended
         self._stopping = self._set_point_bit = False
         self._zero_qc = 0
-        self._law: Law = self._no_demand
+        self._law: Law = self._follow_ramp
         self._set_point: SetPoint | None = None
         self._next: SetPoint | None = None
         self._off_since_s = 0.0
@@ -266,9 +266,6 @@ class Motion:
         """Demand of motor current [A] for the coming step."""
         current = self._law(speed_rad_s, position_rad, dt_s)
         return current if self.powered else 0.0
-
-    def _no_demand(self, _speed: float, _position: float, _dt_s: float) -> float:
-        return 0.0
 
     def _follow_ramp(self, speed: float, _position: float, dt_s: float) -> float:
         ramp = self.ramp

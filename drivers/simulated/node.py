@@ -14,6 +14,7 @@ from drivers.bus.contract import ID_MASK, RTR_FLAG
 from drivers.canopen.codes import NmtCommand, NmtState
 from drivers.simulated.bus import SimulatedPort
 from drivers.simulated.dictionary import CANNOT_STORE, LOAD, OUT_OF_RANGE, SAVE, SdoAbort, SimulatedDictionary
+from drivers.simulated.guarding import GuardedSide
 from drivers.simulated.pdo import Pdo, ReceivePdo, TransmitPdo
 from drivers.simulated.sdo_server import SdoServer
 
@@ -88,9 +89,7 @@ class SimulatedNode:
         self._sync_rpdos: list[ReceivePdo] = []
         self._sync_tpdos: list[TransmitPdo] = []
         self._handlers: dict[int, Handler] = {}
-        self._toggle = 0
-        self._life_end_s = 0.0
-        self._life_timer: asyncio.TimerHandle | None = None
+        self._guarding = GuardedSide(self._life_time_s, self._on_master_lost)
         self._boot_timer: asyncio.TimerHandle | None = None
         self._held_emergency: bytes | None = None
         self._describe_objects()
@@ -143,10 +142,10 @@ class SimulatedNode:
         self._stop_communication()
 
     def _stop_communication(self) -> None:
-        for timer in (self._boot_timer, self._life_timer):
-            if timer is not None:
-                timer.cancel()
-        self._boot_timer = self._life_timer = None
+        if self._boot_timer is not None:
+            self._boot_timer.cancel()
+            self._boot_timer = None
+        self._guarding.restart()
         self._held_emergency = None
         self._sdo.reset()
         self._enter(NmtState.BOOT_UP)
@@ -159,7 +158,6 @@ class SimulatedNode:
 
     def _boot(self, whole: bool) -> None:
         self._boot_timer = None
-        self._toggle = 0
         if whole:
             self.application_started()
         self.port.send(_GUARDING + self.node_id, bytes((NmtState.BOOT_UP,)))
@@ -273,22 +271,14 @@ class SimulatedNode:
     # Guarding
 
     def _on_guard_request(self, _: bytes, now_s: float) -> None:
-        self.port.send(_GUARDING + self.node_id, bytes((self._toggle | self.nmt_state,)))
-        self._toggle ^= 0x80
-        life_s = 0.001 * self.dictionary.number("guard_time") * self.dictionary.number("life_time_factor")
-        self._life_end_s = now_s + life_s
-        if life_s and self._life_timer is None:
-            self._life_timer = asyncio.get_running_loop().call_at(self._life_end_s, self._on_life_timer)
+        self.port.send(_GUARDING + self.node_id, self._guarding.answer(self.nmt_state, now_s))
 
-    def _on_life_timer(self) -> None:
-        loop = asyncio.get_running_loop()
-        if loop.time() < self._life_end_s:
-            self._life_timer = loop.call_at(self._life_end_s, self._on_life_timer)
-            return
-        self._life_timer = None
-        if self.dictionary.number("guard_time") and self.dictionary.number("life_time_factor"):
-            self.before_access(loop.time())
-            self.master_lost()
+    def _life_time_s(self) -> float:
+        return 0.001 * self.dictionary.number("guard_time") * self.dictionary.number("life_time_factor")
+
+    def _on_master_lost(self) -> None:
+        self.before_access(asyncio.get_running_loop().time())
+        self.master_lost()
 
     # Emergencies
 
