@@ -107,6 +107,7 @@ class Server:
         self.counters = Counters()
         self.connections: set[Connection] = set()
         self.tasks: set[asyncio.Task[None]] = set()
+        self._listener: socket.socket | None = None
         self._server: asyncio.Server | None = None
         self._inode = 0
 
@@ -118,15 +119,17 @@ class Server:
             ConfigError: the path cannot be used.
             PermissionRefused: this user may not create it.
         """
-        listener = open_listener(self.path)
+        self._listener = open_listener(self.path)
         self._inode = os.stat(self.path).st_ino
-        self._server = await asyncio.get_running_loop().create_unix_server(self._accept, sock=listener)
+        self._server = await asyncio.get_running_loop().create_unix_server(self._accept, sock=self._listener)
         self.backend.events.append(self._on_event)
 
     async def close(self) -> None:
         """Hang up on everybody and take the socket away."""
-        if self._server is None:
+        if self._server is None or self._listener is None:
             return
+        asyncio.get_running_loop().remove_reader(self._listener)
+        await asyncio.sleep(0)  # asyncio loses a connection that it has just accepted when its server closes
         self._server.close()
         self._server = None
         self.backend.events.remove(self._on_event)

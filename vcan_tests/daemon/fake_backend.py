@@ -115,7 +115,13 @@ def served(backend: FakeBackend, path: Path) -> Iterator[Server]:
     try:
         yield server
     finally:
-        asyncio.run_coroutine_threadsafe(server.close(), loop).result(5)
+        asyncio.run_coroutine_threadsafe(_take_down(server), loop).result(5)
         loop.call_soon_threadsafe(loop.stop)
         thread.join(5)
         loop.close()
+
+
+async def _take_down(server: Server) -> None:
+    await server.close()
+    for _ in range(10):  # turns of the loop for connections that were just being accepted
+        await asyncio.sleep(0)

@@ -95,7 +95,7 @@ def test_a_command_sends_its_method(
 # -- exit codes -------------------------------------------------------------------------------------------------------
 
 CODES = [
-    ("motor enable 8", 1, "9000 rpm is beyond the limit - ask for less"),
+    ("motor enable 8", 1, "9000 rpm is beyond the limit (limit: 8000 rpm) - ask for less"),
     ("motor reset 1", 1, "failed inside the daemon"),
     ("motor enable 0", 2, "node id 0 is out of range"),
     ("motor enable 200", 2, "1 to 127"),
