@@ -8,39 +8,14 @@ from typing import Any
 
 import can
 import canopen
-from canopen.objectdictionary import ODArray, ODRecord, ODVariable
 
-from drivers.canopen.objects import ObjectTable
 from drivers.encoder.objects import OBJECTS as ENCODER
 from drivers.epos.objects import OBJECTS as EPOS
-from vcan_tests.drivers.test_epos_objects import PEER_TYPES
+from vcan_tests.peer import peer_dictionary
 
 DRIVES = (1, 2, 3, 4)
 ENCODERS = (5, 6)
 _DOWNLOAD_SIZES = {0x2F: 1, 0x2B: 2, 0x27: 3, 0x23: 4}
-
-
-def peer_dictionary(table: ObjectTable) -> canopen.ObjectDictionary:
-    """The same object dictionary in the ``canopen`` library."""
-    dictionary = canopen.ObjectDictionary()
-    subs = defaultdict(list)
-    for entry in table.objects:
-        subs[entry.index].append(entry)
-    for index, entries in subs.items():
-        if len(entries) == 1 and entries[0].sub == 0:
-            dictionary.add_object(_variable(entries[0]))
-            continue
-        group: ODRecord | ODArray = ODRecord(f"{entries[0].name}_{index:04x}", index)
-        for entry in entries:
-            group.add_member(_variable(entry))
-        dictionary.add_object(group)
-    return dictionary
-
-
-def _variable(entry: Any) -> ODVariable:
-    variable = ODVariable(entry.name, entry.index, entry.sub)
-    variable.data_type = PEER_TYPES[entry.type]
-    return variable
 
 
 class LogReader:
@@ -66,11 +41,11 @@ class LogReader:
         for node in self._nodes.values():
             self._network.add_node(node)
         self._pdo_of_cob_id: dict[int, canopen.pdo.base.PdoMap] = {}
-        for node in ENCODERS:
+        for encoder in ENCODERS:
             for number, base in ((1, 0x180), (2, 0x280)):
-                pdo = self._nodes[node].tpdo[number]
+                pdo = self._nodes[encoder].tpdo[number]
                 pdo.add_variable(0x6004)
-                self._name(pdo, base + node)
+                self._name(pdo, base + encoder)
 
     def _name(self, pdo: Any, cob_id: int) -> None:
         pdo.cob_id = cob_id

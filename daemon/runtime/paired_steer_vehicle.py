@@ -20,7 +20,7 @@ from daemon.loops.paired_steer_target import (
     why_not_rotate,
 )
 from daemon.runtime.motions import Motion
-from daemon.runtime.vehicles import Vehicle
+from daemon.runtime.vehicle import Vehicle
 from drivers.contract import Brake, Drive, SteeringEncoder
 from profiles.schema import PairedSteerGeometry, Profile
 

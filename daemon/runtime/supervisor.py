@@ -20,7 +20,7 @@ from daemon.runtime.leases import Leases
 from daemon.runtime.motions import Motion
 from daemon.runtime.rest import AT_REST_M_S, RestWatch
 from daemon.runtime.tasks import TaskSet
-from daemon.runtime.vehicles import Vehicle
+from daemon.runtime.vehicle import Vehicle
 from daemon.runtime.watch import DeviceWatch
 from drivers.canopen.master import Master, NodeEvent
 from drivers.contract import Device, Drive, DriveState, NodeState

@@ -1,113 +1,16 @@
-"""Which loops a profile runs: the vehicle as the supervisor sees it."""
+"""Which loops a profile runs."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from typing import Any
-
 from canhelm.errors import ConfigError
-from daemon.loops.limits import Gate
-from daemon.loops.measurement import Command, Measurement
-from daemon.runtime.motions import Motion
-from drivers.contract import Brake, BrakeState, Drive, SteeringEncoder
+from daemon.runtime.paired_steer_vehicle import PairedSteerVehicle
+from daemon.runtime.vehicle import BareDrives, Vehicle
 from drivers.devices import Devices
 from profiles.schema import PairedSteerGeometry, Profile
 
 
-class Vehicle(ABC):
-    """Drives, encoders and brakes in the order of the loops, and the motions that the vehicle has.
-
-    Args:
-        profile: the robot.
-        drives, encoders, brakes: its devices, in the order of the loops.
-
-    Attributes:
-        methods: names of the ``drive.*`` methods and of others that this vehicle has.
-        zero: the command that moves nothing and leaves the brakes as they are.
-    """
-
-    methods: tuple[str, ...] = ()
-
-    def __init__(
-        self,
-        profile: Profile,
-        drives: tuple[Drive, ...],
-        encoders: tuple[SteeringEncoder, ...] = (),
-        brakes: tuple[Brake, ...] = (),
-    ) -> None:
-        self.profile = profile
-        self.drives = drives
-        self.encoders = encoders
-        self.brakes = brakes
-        self.zero = Command((0.0,) * len(drives))
-        self._gate = Gate(profile.limits, profile.vehicle)
-
-    def measure(self, now_s: float) -> Measurement:
-        """The newest readings of all devices."""
-        return Measurement(
-            now_s,
-            tuple([drive.speed_m_s for drive in self.drives]),
-            tuple([drive.position_m for drive in self.drives]),
-            tuple([encoder.heading_rad for encoder in self.encoders]),
-            tuple([brake.state is BrakeState.ENGAGED for brake in self.brakes]),
-            tuple([brake.state is BrakeState.RELEASED for brake in self.brakes]),
-        )
-
-    def gate(
-        self, command: Command, measurement: Measurement, previous: Command, dt_s: float
-    ) -> tuple[Command, tuple[str, ...]]:
-        """The command that may be sent, and the names of the limits that changed it."""
-        return self._gate.apply(command, measurement, previous, dt_s)
-
-    @abstractmethod
-    def motion(self, method: str, params: dict[str, Any], lease: str | None) -> Motion:
-        """The motion that a method asks for. Raises LimitExceeded, Refused or UsageError."""
-
-    def update(
-        self, method: str, params: dict[str, Any], lease: str | None, motions: list[Motion]
-    ) -> dict[str, Any] | None:
-        """Take a new value into a running motion of the same holder; None where the method begins one."""
-        return None
-
-    def observe(self, measurement: Measurement) -> None:
-        """Told of every cycle's measurement (odometry)."""
-
-    def require_free(self, motion: Motion) -> None:
-        """Raise Interlock where a brake stands against the motion."""
-
-    def wheel_of(self, name: str) -> tuple[int, int]:
-        """Index of a drive in the order of the loops, and the number of drives."""
-        return [drive.name for drive in self.drives].index(name), len(self.drives)
-
-    def wheel_limit_m_s(self, name: str) -> float:
-        """Largest rim speed of a drive: the smaller one of its own limit and the vehicle's."""
-        return min(self.profile.drives[name].max_speed_m_s, self.profile.limits.wheel_speed_m_s)
-
-    def current_limit_a(self, name: str) -> float:
-        """Largest current that may be commanded to a drive."""
-        return self.profile.drives[name].continuous_current_a
-
-    def stopping_time_s(self) -> float:
-        """Time that the slowest quick-stop ramp needs from the fastest speed."""
-        return max(self.wheel_limit_m_s(name) / drive.quick_stop_m_s2 for name, drive in self.profile.drives.items())
-
-    def status(self) -> dict[str, Any]:
-        """The vehicle for ``status``."""
-        return {"type": None, "methods": list(self.methods)}
-
-
-class BareDrives(Vehicle):
-    """No vehicle, only drives: every motor on its own."""
-
-    def motion(self, method: str, params: dict[str, Any], lease: str | None) -> Motion:
-        """Never called: there are no methods."""
-        raise AssertionError(method)
-
-
 def make_vehicle(profile: Profile, devices: Devices) -> Vehicle:
     """The vehicle of a profile on its devices. Raises ConfigError for a type that has no loops here."""
-    from daemon.runtime.paired_steer_vehicle import PairedSteerVehicle
-
     geometry = profile.vehicle
     if geometry is None:
         return BareDrives(profile, tuple(devices.drives.values()))

@@ -1,34 +1,16 @@
 from __future__ import annotations
 
 import pytest
-from canopen.objectdictionary import ODVariable, datatypes
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.canopen.objects import Access, DataType, ObjectDef, ObjectTable
+from drivers.canopen.objects import Access, ObjectDef, ObjectTable
 from drivers.encoder.objects import OBJECTS as ENCODER
 from drivers.epos.objects import OBJECTS as EPOS
+from vcan_tests.peer import peer_variable
 
-PEER_TYPES = {
-    DataType.U8: datatypes.UNSIGNED8,
-    DataType.U16: datatypes.UNSIGNED16,
-    DataType.U32: datatypes.UNSIGNED32,
-    DataType.U64: datatypes.UNSIGNED64,
-    DataType.I8: datatypes.INTEGER8,
-    DataType.I16: datatypes.INTEGER16,
-    DataType.I32: datatypes.INTEGER32,
-    DataType.VISIBLE_STRING: datatypes.VISIBLE_STRING,
-    DataType.DOMAIN: datatypes.DOMAIN,
-}
 ALL = EPOS.objects + ENCODER.objects
 NUMBERS = [entry for entry in ALL if entry.type.bits]
-
-
-def peer(entry: ObjectDef) -> ODVariable:
-    """The same object in the ``canopen`` library, as a second opinion."""
-    variable = ODVariable(entry.name, entry.index, entry.sub)
-    variable.data_type = PEER_TYPES[entry.type]
-    return variable
 
 
 def limits(entry: ObjectDef) -> tuple[int, int]:
@@ -47,13 +29,13 @@ def test_a_cause_comes_with_a_cure() -> None:
 
 
 def test_sizes_agree_with_an_independent_dictionary() -> None:
-    assert [entry.address for entry in NUMBERS if len(peer(entry)) != entry.type.bits] == []
+    assert [entry.address for entry in NUMBERS if len(peer_variable(entry)) != entry.type.bits] == []
 
 
 @given(st.sampled_from(NUMBERS), st.data())
 def test_values_encode_as_in_an_independent_dictionary(entry: ObjectDef, data: st.DataObject) -> None:
     value = data.draw(st.integers(*limits(entry)))
-    assert entry.type.pack(value) == peer(entry).encode_raw(value)
+    assert entry.type.pack(value) == peer_variable(entry).encode_raw(value)
 
 
 @given(st.sampled_from(NUMBERS), st.data())
