@@ -369,6 +369,21 @@ async def test_a_server_that_closes_hangs_up_on_motions(server: Server, connect:
     assert await client.ended()
 
 
+@pytest.mark.parametrize("turns", range(5))
+async def test_a_connection_that_is_being_accepted_is_not_lost_by_closing(server: Server, turns: int) -> None:
+    with socket.socket(socket.AF_UNIX) as late:
+        late.connect(os.fspath(server.path))
+        for _ in range(turns):
+            await asyncio.sleep(0)
+        await server.close()
+        for _ in range(5):
+            await asyncio.sleep(0)
+        late.settimeout(1.0)
+        with contextlib.suppress(ConnectionResetError):
+            while late.recv(65536):
+                pass
+
+
 def test_a_line_of_the_protocol_is_one_json_object() -> None:
     assert json.loads(protocol.make_request(1, "stop", {})) == {
         "jsonrpc": "2.0",
