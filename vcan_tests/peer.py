@@ -34,7 +34,7 @@ def peer_dictionary(table: ObjectTable) -> canopen.ObjectDictionary:
     entries = defaultdict(list)
     for entry in table.objects:
         entries[entry.index].append(entry)
-    dictionary = canopen.ObjectDictionary()
+    dictionary = canopen.ObjectDictionary()  # type: ignore[no-untyped-call]
     for index, group in entries.items():
         if len(group) == 1 and group[0].sub == 0:
             dictionary.add_object(peer_variable(group[0]))
