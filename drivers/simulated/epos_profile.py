@@ -150,15 +150,15 @@ class Regulator:
 
     def limit(self, current: float, dt_s: float) -> float:
         """A demand [A] within the output limit, or the continuous one while the winding is warm (one thermal mass)."""
-        warm = self.continuous_a * self.continuous_a
-        if self._heat_a2 >= warm:
+        heat, warm = self._heat_a2, self.continuous_a * self.continuous_a
+        if heat >= warm:
             self.limited = True
-        elif self._heat_a2 < _COOLED * warm:
+        elif self.limited and heat < _COOLED * warm:
             self.limited = False
         most = self.continuous_a if self.limited and self.continuous_a < self.output_a else self.output_a
         if current > most:
             current = most
         elif current < -most:
             current = -most
-        self._heat_a2 += (current * current - self._heat_a2) * dt_s / self.winding_s
+        self._heat_a2 = heat + (current * current - heat) * dt_s / self.winding_s
         return current

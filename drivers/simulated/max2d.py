@@ -14,7 +14,7 @@ of mass.
 
 from __future__ import annotations
 
-from math import atan, cos, hypot, sin
+from math import cos, hypot, sin
 from random import Random
 
 from canhelm.errors import ConfigError
@@ -128,16 +128,6 @@ class Max2dWorld:
         """Forces of the floor on wheels 1 to 4, along and to the left of their headings."""
         return tuple((wheel.contact.force_x_n, wheel.contact.force_y_n) for wheel in self.wheels.values())
 
-    @property
-    def max_slip_ratio(self) -> float:
-        """Largest slip ratio of any wheel, without sign, since the last ``reset_statistics``."""
-        return max(wheel.contact.max_slip_ratio for wheel in self.wheels.values())
-
-    @property
-    def max_slip_angle_rad(self) -> float:
-        """Largest slip angle of any wheel, without sign, since the last ``reset_statistics``."""
-        return max(atan(wheel.contact.max_slip_tangent) for wheel in self.wheels.values())
-
     def heading_rad(self, pair: str) -> float:
         """True heading of a wheel pair by its encoder's name."""
         return self.pairs[pair].heading_rad
@@ -150,11 +140,6 @@ class Max2dWorld:
         """Engage or release a brake from the last advanced time on."""
         self._braked[name].set_brake(engaged)
         self._quiet_steps = 0
-
-    def reset_statistics(self) -> None:
-        """Forget the largest slips."""
-        for wheel in self.wheels.values():
-            wheel.contact.reset_statistics()
 
     def advance(self, now_s: float) -> None:
         """Integrate up to ``now_s``; the first call sets the origin of time."""

@@ -90,7 +90,11 @@ class WheelDrive:
             dt_s: length of the step.
         """
         axis = self.axis
-        current = axis.current_a = self._flowing(axis.speed_rad_s)
+        current, shaft = self.demand_a, axis.speed_rad_s
+        voltage = self._torque_constant * shaft + self._resistance_ohm * current
+        if not -self._supply_v <= voltage <= self._supply_v:
+            current = self._flowing(shaft)
+        axis.current_a = current
         torque = self._wheel_torque_per_a * current
         speed = self.wheel_rad_s
         loss = (self._forward_loss if torque * speed >= 0.0 else self._back_loss) * torque
@@ -110,7 +114,7 @@ class WheelDrive:
         axis.position_rad += shaft * dt_s
 
     def _flowing(self, shaft_rad_s: float) -> float:
-        """Current [A] that supply voltage and back-EMF let flow for the present demand.
+        """Current [A] that supply voltage and back-EMF let flow for a demand that they cannot meet.
 
         Beyond the no-load speed the power stage's diodes conduct: current brakes the motor whatever is demanded.
         """

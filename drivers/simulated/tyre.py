@@ -40,16 +40,15 @@ class Contact:
         "_deflection_x",
         "_deflection_y",
         "_friction",
+        "_lateral_m_s",
         "_limit_m",
+        "_rim_m_s",
+        "_roll_m_s",
         "_roll_out_x",
         "_roll_out_y",
         "_stiffness",
         "force_x_n",
         "force_y_n",
-        "max_slip_ratio",
-        "max_slip_tangent",
-        "slip_ratio",
-        "slip_tangent",
     )
 
     def __init__(self, tyre: Tyre) -> None:
@@ -63,17 +62,18 @@ class Contact:
         self._deflection_y = 0.0
         self.force_x_n = 0.0
         self.force_y_n = 0.0
-        self.slip_ratio = 0.0
-        """(rim speed - rolling speed) over the faster of the two."""
-        self.slip_tangent = 0.0
-        """Velocity of the contact point to the left of the heading, over its rolling speed."""
-        self.max_slip_ratio = 0.0
-        self.max_slip_tangent = 0.0
+        self._rim_m_s = self._roll_m_s = self._lateral_m_s = 0.0
+
+    @property
+    def slip_ratio(self) -> float:
+        """(rim speed - rolling speed) over the faster of the two, in the last step."""
+        reference = max(abs(self._rim_m_s), abs(self._roll_m_s), SLOWEST_REFERENCE_M_S)
+        return (self._rim_m_s - self._roll_m_s) / reference
 
     @property
     def slip_angle_rad(self) -> float:
-        """Angle from the wheel's heading to the motion of its contact point, positive to the left."""
-        return atan(self.slip_tangent)
+        """Angle from the wheel's heading to the motion of its contact point, positive to the left, in the last step."""
+        return atan(self._lateral_m_s / max(abs(self._roll_m_s), SLOWEST_REFERENCE_M_S))
 
     def deform(self, rim_m_s: float, roll_m_s: float, lateral_m_s: float, load_n: float, dt_s: float) -> None:
         """Bend the bristles for one step and update the forces.
@@ -103,33 +103,9 @@ class Contact:
         self.force_y_n = stiffness * bent_y
         self._deflection_x = x
         self._deflection_y = y
-        self._note_slip(rim_m_s, roll_m_s, lateral_m_s)
+        self._rim_m_s, self._roll_m_s, self._lateral_m_s = rim_m_s, roll_m_s, lateral_m_s
 
     def _slide(self, x: float, y: float) -> tuple[float, float]:
         """Bristles bent beyond the limit slide back to it."""
         excess = sqrt(x * x + y * y) / self._limit_m
         return (x / excess, y / excess) if excess > 1.0 else (x, y)
-
-    def _note_slip(self, rim_m_s: float, roll_m_s: float, lateral_m_s: float) -> None:
-        """Keep the present slip and its maxima."""
-        rolling = roll_m_s if roll_m_s >= 0.0 else -roll_m_s
-        if rolling < SLOWEST_REFERENCE_M_S:
-            rolling = SLOWEST_REFERENCE_M_S
-        tangent = lateral_m_s / rolling
-        rim = rim_m_s if rim_m_s >= 0.0 else -rim_m_s
-        ratio = (rim_m_s - roll_m_s) / (rim if rim > rolling else rolling)
-        self.slip_ratio = ratio
-        self.slip_tangent = tangent
-        if ratio < 0.0:
-            ratio = -ratio
-        if tangent < 0.0:
-            tangent = -tangent
-        if ratio > self.max_slip_ratio:
-            self.max_slip_ratio = ratio
-        if tangent > self.max_slip_tangent:
-            self.max_slip_tangent = tangent
-
-    def reset_statistics(self) -> None:
-        """Forget the maxima."""
-        self.max_slip_ratio = 0.0
-        self.max_slip_tangent = 0.0

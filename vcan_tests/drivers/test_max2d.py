@@ -222,11 +222,3 @@ def test_a_spinning_wheel_has_a_positive_slip_ratio() -> None:
     robot = Robot(with_tyre(friction=0.1))
     robot.roll(2.0, 0.0, 0.0, 0.0, for_s=0.2)
     assert robot.world.slip_ratio[0] > 0.1
-
-
-def test_slip_statistics_start_anew() -> None:
-    robot = Robot()
-    robot.roll(*[2.0] * 4, for_s=0.3)
-    assert robot.world.max_slip_ratio > 0.05
-    robot.world.reset_statistics()
-    assert (robot.world.max_slip_ratio, robot.world.max_slip_angle_rad) == (0.0, 0.0)

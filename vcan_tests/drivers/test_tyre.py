@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from math import hypot, tan
+from math import atan, hypot, tan
 
 import pytest
 from hypothesis import given
@@ -85,9 +85,11 @@ def test_a_standing_tyre_gives_back_no_more_work_than_it_got(motion: list[tuple[
         assert work >= -1e-9
 
 
-def test_maxima_of_slip_are_kept_until_reset() -> None:
-    contact = rolled(1.0, 0.8, 0.2, 0.01)
-    contact.deform(1.0, 1.0, 0.0, LOAD_N, DT_S)
-    assert (contact.max_slip_ratio, contact.max_slip_tangent) == pytest.approx((0.2, 0.25))
-    contact.reset_statistics()
-    assert (contact.max_slip_ratio, contact.max_slip_tangent) == (0.0, 0.0)
+@pytest.mark.parametrize(
+    ("rim", "roll", "lateral", "ratio", "tangent"),
+    [(1.0, 0.8, 0.2, 0.2, 0.25), (0.8, 1.0, -0.1, -0.2, -0.1), (0.01, 0.0, 0.01, 0.2, 0.2)],
+)
+def test_slip_is_that_of_the_last_step(rim: float, roll: float, lateral: float, ratio: float, tangent: float) -> None:
+    contact = rolled(1.0, 0.5, 0.5, 0.01)
+    contact.deform(rim, roll, lateral, LOAD_N, DT_S)
+    assert (contact.slip_ratio, contact.slip_angle_rad) == pytest.approx((ratio, atan(tangent)))
