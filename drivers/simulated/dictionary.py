@@ -99,7 +99,8 @@ class SimulatedDictionary:
 
     def number(self, name: str) -> int:
         """The stored value of a numeric object."""
-        return int(self.values[self.address(name)])
+        entry = self.table[name]
+        return int(self.values[entry.index, entry.sub])
 
     def find(self, index: int, sub: int) -> ObjectDef:
         """The entry at an address. Raises SdoAbort for an unknown index or sub-index."""

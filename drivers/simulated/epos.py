@@ -228,6 +228,8 @@ class SimulatedEpos(SimulatedNode):
         dictionary.checks |= {dictionary.address(name): check for name, check in checks.items()}
 
     def _on_controlword(self, word: int) -> None:
+        if word == self._word and self.motion.mode is not Mode.PROFILE_POSITION:
+            return  # what it asks for was done when it came; only mode 1 looks at its level again
         rising = word & ~self._word
         self._word = word
         faulty = self.control.state is State.FAULT

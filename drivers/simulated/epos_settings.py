@@ -122,8 +122,10 @@ class Settings:
             action(self._dictionary.number(name))
 
     def _take_target_velocity(self, value_rpm: int) -> None:
-        self._motion.set_values.target_velocity = value_rpm * self.rad_s_per_rpm
-        self._motion.update()
+        target = value_rpm * self.rad_s_per_rpm
+        if target != self._motion.set_values.target_velocity:
+            self._motion.set_values.target_velocity = target
+            self._motion.update()
 
     def _take_velocity(self, value_rpm: int) -> None:
         self._motion.set_values.velocity = value_rpm * self.rad_s_per_rpm
