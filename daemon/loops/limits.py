@@ -56,8 +56,9 @@ class Gate:
             dt: time since then [s].
         """
         active: list[str] = []
-        speeds = [speed if math.isfinite(speed) else 0.0 for speed in command.wheel_speed_m_s]
-        if any(not math.isfinite(speed) for speed in command.wheel_speed_m_s):
+        speeds = list(command.wheel_speed_m_s)
+        if not all(map(math.isfinite, speeds)):
+            speeds = [speed if math.isfinite(speed) else 0.0 for speed in speeds]
             active.append(NOT_FINITE)
         speeds = self._limit_speed(speeds, active)
         speeds = self._limit_acceleration(speeds, previous.wheel_speed_m_s, dt, active)
@@ -79,17 +80,18 @@ class Gate:
         self, speeds: list[float], previous: tuple[float, ...], dt: float, active: list[str]
     ) -> list[float]:
         step = self._acceleration_m_s2 * dt if dt > 0 else 0.0
-        largest = max((abs(new - old) for new, old in zip(speeds, previous, strict=True)), default=0.0)
+        changes = [new - old for new, old in zip(speeds, previous, strict=True)]
+        largest = max(map(abs, changes), default=0.0)
         if largest <= step * (1 + _ROUNDING):
             return speeds
         active.append(WHEEL_ACCELERATION)
         part = step / largest
-        return [old + part * (new - old) for new, old in zip(speeds, previous, strict=True)]
+        return [old + part * change for old, change in zip(previous, changes, strict=True)]
 
     def _interlock(self, speeds: list[float], measurement: Measurement, active: list[str]) -> list[float]:
-        loose = [pair for pair, engaged in enumerate(measurement.brake_engaged) if not engaged]
-        if not loose:
+        if all(measurement.brake_engaged):
             return speeds
+        loose = [pair for pair, engaged in enumerate(measurement.brake_engaged) if not engaged]
         allowed = [0.0] * len(speeds)
         if len(loose) == 1 and measurement.brake_released[loose[0]]:
             first, second = WHEELS_OF_PAIR[loose[0]]

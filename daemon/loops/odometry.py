@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from daemon.loops.geometry import PAIR_OF_WHEEL, TURN_SIGN, WHEELS_OF_PAIR, PerPair, contact_points
+from daemon.loops.geometry import FRONT, REAR, TURN_SIGN, WHEELS_OF_PAIR, PerPair
 from daemon.loops.measurement import Measurement
 from profiles.schema import PairedSteerGeometry
 
@@ -81,29 +81,33 @@ class Odometry:
         return self.pose
 
     def _body_motion(self, heading_rad: PerPair, rolled_m: list[float], turned_rad: list[float]) -> Row:
-        contact = contact_points(self._geometry, *heading_rad)
+        """The twist (dx, dy, dyaw) at the mean headings.
+
+        A point (x, y) moves along a heading p by (cos p, sin p, x sin p - y cos p) times the twist, and to its left by
+        (-sin p, cos p, x cos p + y sin p) times it; the contact points of ``daemon.loops.geometry`` are put in.
+        """
+        geometry, offset = self._geometry, self._geometry.contact_offset_m
         rows: list[Row] = []
         values: list[float] = []
-        for wheel, pair in enumerate(PAIR_OF_WHEEL):
+        for pair, end in ((REAR, -1.0), (FRONT, 1.0)):
             cos, sin = math.cos(heading_rad[pair]), math.sin(heading_rad[pair])
-            x, y = contact[wheel]
-            rows.append((cos, sin, x * sin - y * cos))
-            values.append(rolled_m[wheel] - TURN_SIGN[wheel] * self._geometry.contact_offset_m * turned_rad[pair])
-        for pair, (first, second) in enumerate(WHEELS_OF_PAIR):
-            cos, sin = math.cos(heading_rad[pair]), math.sin(heading_rad[pair])
-            x = (contact[first][0] + contact[second][0]) / 2
-            y = (contact[first][1] + contact[second][1]) / 2
-            rows.append((-sin, cos, x * cos + y * sin))
+            axis_m = end * geometry.wheelbase_m / 2
+            arm_m = geometry.pivot_track_m / 2 * cos + offset
+            for wheel in WHEELS_OF_PAIR[pair]:
+                rows.append((cos, sin, axis_m * sin + TURN_SIGN[wheel] * arm_m))
+                values.append(rolled_m[wheel] - TURN_SIGN[wheel] * offset * turned_rad[pair])
+            rows.append((-sin, cos, axis_m * cos + end * geometry.contact_lead_m))
             values.append(0.0)
         return _least_squares(rows, values)
 
 
 def _least_squares(rows: list[Row], values: list[float]) -> Row:
     """Solution of the normal equations of three unknowns by Cramer's rule."""
-    a, b, c, d, e, f = (
-        sum(row[i] * row[k] for row in rows) for i, k in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-    )
-    p, q, r = (sum(row[i] * value for row, value in zip(rows, values, strict=True)) for i in range(3))
+    a = b = c = d = e = f = p = q = r = 0.0
+    for (x, y, z), value in zip(rows, values, strict=True):
+        a, b, c = a + x * x, b + x * y, c + x * z
+        d, e, f = d + y * y, e + y * z, f + z * z
+        p, q, r = p + x * value, q + y * value, r + z * value
     minor_a, minor_b, minor_c = d * f - e * e, c * e - b * f, b * e - c * d
     determinant = a * minor_a + b * minor_b + c * minor_c
     return (
