@@ -6,8 +6,8 @@ import asyncio
 import logging
 import signal
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from daemon.api.server import Server
 from daemon.runtime.clock import VirtualTimeLoop
 from daemon.runtime.commands import Commands
 from daemon.runtime.cycle import Cycle
@@ -16,12 +16,14 @@ from daemon.runtime.service import Service
 from daemon.runtime.supervisor import Supervisor
 from daemon.runtime.vehicles import make_vehicle
 from drivers.bus.contract import Bus
-from drivers.bus.python_can import open_bus
 from drivers.canopen.master import Master
 from drivers.devices import Devices
 from drivers.simulated.bus import SimulatedBus
 from drivers.simulated.network import SimulatedNetwork
 from profiles.schema import Profile
+
+if TYPE_CHECKING:
+    from daemon.api.server import Server
 
 LOGGER = logging.getLogger("canhelm")
 
@@ -57,7 +59,7 @@ class App:
         self._powered = powered
         self._record = record
         self.recorder: CandumpRecorder | None = None
-        self.bus = self._simulated_bus(seed) if bus == "simulated" else open_bus(bus, profile.network.bit_rate)
+        self.bus = self._simulated_bus(seed) if bus == "simulated" else self._real_bus(bus)
         self.master = Master(self.bus, profile.network)
         self.devices = Devices(self.master, profile)
         self.vehicle = make_vehicle(profile, self.devices)
@@ -66,12 +68,22 @@ class App:
         self.cycle = Cycle(self.master, self.devices, period_s, self.supervisor.step)
         commands = Commands(self.supervisor, self._switch_power if self.network else None)
         self.service = Service(profile.name, self.supervisor, commands, self.bus, self.cycle)
-        self.server = Server(self.service, socket) if socket else None
+        self.server = self._serve(socket) if socket else None
 
     def _simulated_bus(self, seed: int) -> Bus:
         self.medium = SimulatedBus(bit_rate=self.profile.network.bit_rate, name="vcan0")
         self.network = SimulatedNetwork(self.profile, self.medium, seed)
         return self.medium.port("master")
+
+    def _real_bus(self, spec: str) -> Bus:
+        from drivers.bus.python_can import open_bus  # here, so that a simulation does not wait for python-can
+
+        return open_bus(spec, self.profile.network.bit_rate)
+
+    def _serve(self, socket: Path) -> Server:
+        from daemon.api.server import Server
+
+        return Server(self.service, socket)
 
     def _switch_power(self, node: int | str, on: bool) -> None:
         assert self.network is not None

@@ -13,11 +13,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from canhelm.errors import Timeout, UsageError
 from daemon.app import App
 from daemon.loops.geometry import solve_turning
+from daemon.loops.odometry import least_squares
 from daemon.runtime.supervisor import VehicleState
 from profiles.schema import PairedSteerGeometry, Profile
 
@@ -264,10 +263,11 @@ def steady_rows(track: Track) -> list[int]:
 
 def fitted_radius(track: Track) -> float:
     """Radius of the circle that fits the centre's steady track best (algebraic least squares) [m]."""
-    points = np.array([track.pose[row][:2] for row in steady_rows(track)])
-    matrix = np.column_stack([2 * points, np.ones(len(points))])
-    centre_x, centre_y, offset = np.linalg.lstsq(matrix, (points**2).sum(axis=1), rcond=None)[0]
-    return float(math.sqrt(offset + centre_x**2 + centre_y**2))
+    points = [track.pose[row][:2] for row in steady_rows(track)]
+    centre_x, centre_y, offset = least_squares(
+        [(2 * x, 2 * y, 1.0) for x, y in points], [x * x + y * y for x, y in points]
+    )
+    return math.sqrt(offset + centre_x**2 + centre_y**2)
 
 
 def _relative(pose: tuple[float, float, float], origin: tuple[float, float, float]) -> tuple[float, float, float]:

@@ -98,11 +98,11 @@ class Odometry:
                 values.append(rolled_m[wheel] - TURN_SIGN[wheel] * offset * turned_rad[pair])
             rows.append((-sin, cos, axis_m * cos + end * geometry.contact_lead_m))
             values.append(0.0)
-        return _least_squares(rows, values)
+        return least_squares(rows, values)
 
 
-def _least_squares(rows: list[Row], values: list[float]) -> Row:
-    """Solution of the normal equations of three unknowns by Cramer's rule."""
+def least_squares(rows: list[Row], values: list[float]) -> Row:
+    """The three unknowns that fit the equations ``row . unknowns = value`` best: normal equations by Cramer's rule."""
     a = b = c = d = e = f = p = q = r = 0.0
     for (x, y, z), value in zip(rows, values, strict=True):
         a, b, c = a + x * x, b + x * y, c + x * z
