@@ -138,11 +138,15 @@ def _checked_name(robot: str) -> str:
 def choose_socket(socket_path: str | os.PathLike[str] | None = None, robot: str | None = None) -> Path:
     """The socket to talk to: the one named, the one of a robot, or the only one on which a daemon answers.
 
+    What is not named comes from CANHELM_SOCKET or CANHELM_ROBOT.
+
     Raises:
         DaemonNotRunning: no socket is named and none answers.
         PermissionRefused: the system's folder of sockets is closed to this user and there is no other.
         UsageError: several daemons run and none is chosen.
     """
+    if not socket_path and not robot:
+        socket_path, robot = os.environ.get("CANHELM_SOCKET"), os.environ.get("CANHELM_ROBOT")
     if socket_path:
         return Path(socket_path)
     if robot:

@@ -116,6 +116,12 @@ def test_a_named_socket_is_taken_as_it_is() -> None:
     assert protocol.choose_socket("/a/b.sock", "max2d") == Path("/a/b.sock")
 
 
+def test_the_environment_names_the_socket_where_the_caller_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CANHELM_SOCKET", "/a/c.sock")
+    assert protocol.choose_socket() == Path("/a/c.sock")
+    assert protocol.choose_socket("/a/b.sock") == Path("/a/b.sock")
+
+
 def test_the_only_one_running_is_chosen(folder: Path, listeners: list[socket.socket]) -> None:
     (folder / "dead.sock").touch()
     listen(folder / "max2d.sock", listeners)
