@@ -71,7 +71,8 @@ def test_an_error_of_an_unknown_class_is_still_an_error() -> None:
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """This user's folder of sockets; the system has none."""
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    monkeypatch.delenv("RUNTIME_DIRECTORY", raising=False)
+    for name in ("RUNTIME_DIRECTORY", "CANHELM_SOCKET", "CANHELM_ROBOT"):
+        monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(protocol, "SYSTEM_FOLDER", tmp_path / "no-system")
     (tmp_path / "canhelm").mkdir()
     return tmp_path / "canhelm"
