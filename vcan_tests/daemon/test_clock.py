@@ -51,6 +51,41 @@ async def test_what_is_ready_runs_before_time_goes_on() -> None:
     assert seen == ["soon", "later"]
 
 
+def virtual_loop() -> VirtualTimeLoop:
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, VirtualTimeLoop)
+    return loop
+
+
+async def test_a_callback_may_jump_ahead_of_a_later_timer() -> None:
+    loop = virtual_loop()
+    loop.call_at(2.0, int)
+    assert loop.jump_to(1.5)
+    assert loop.time() == 1.5
+
+
+@pytest.mark.parametrize("due_s", [0.5, 1.0])
+async def test_a_callback_does_not_jump_past_or_to_a_timer(due_s: float) -> None:
+    loop = virtual_loop()
+    loop.call_at(due_s, int)
+    assert not loop.jump_to(1.0)
+    assert loop.time() == 0.0
+
+
+async def test_a_callback_does_not_jump_while_another_is_ready() -> None:
+    loop = virtual_loop()
+    loop.call_soon(int)
+    assert not loop.jump_to(1.0)
+    assert loop.time() == 0.0
+
+
+async def test_a_jump_back_leaves_the_time() -> None:
+    loop = virtual_loop()
+    await asyncio.sleep(1.0)
+    assert loop.jump_to(0.5)
+    assert loop.time() == 1.0
+
+
 async def test_a_timer_in_the_past_does_not_turn_time_back() -> None:
     loop = asyncio.get_running_loop()
     await asyncio.sleep(1.0)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from daemon.runtime.clock import run_virtual
+from daemon.runtime.clock import VirtualTimeLoop, run_virtual
 from drivers.bus.contract import RTR_FLAG
 from drivers.bus.wire_time import frame_bits
 from drivers.simulated.bus import SimulatedBus, SimulatedPort
@@ -39,6 +39,44 @@ async def test_a_frame_is_stamped_and_delivered_at_the_end_of_its_last_bit() -> 
     await asyncio.sleep(0.001)
     assert times[0] == pytest.approx(1.0 + 48e-6)
     assert times[1] == times[0]
+
+
+class LoopWithoutJumps(VirtualTimeLoop):
+    """Every frame gets its timer."""
+
+    def jump_to(self, when: float) -> bool:
+        return False
+
+
+async def busy_wire() -> list[tuple[str, int, float, float]]:
+    """Bursts with answers, timers and tasks in between: who saw what, at which stamp, at which time."""
+    loop, bus = asyncio.get_running_loop(), SimulatedBus(disturbed=0.1)
+    master, node = bus.port("master"), bus.port("node")
+    seen: list[tuple[str, int, float, float]] = []
+
+    def answer(can_id: int, data: bytes, stamp: float) -> None:
+        seen.append(("node", can_id, stamp, loop.time()))
+        node.send(can_id + 0x100, data)
+        if can_id % 3 == 0:
+            loop.call_soon(lambda: seen.append(("soon", can_id, stamp, loop.time())))
+
+    node.receiver = answer
+    master.receiver = lambda can_id, data, stamp: seen.append(("master", can_id, stamp, loop.time()))
+    for step in range(40):
+        loop.call_at(step * 70e-6, lambda: seen.append(("timer", 0, 0.0, loop.time())))
+    for burst in range(8):
+        for number in range(12):
+            master.send(0x181 + number, bytes((burst, number)))
+        await asyncio.sleep(0.3e-3 * burst)
+    await asyncio.sleep(0.1)
+    return seen
+
+
+def test_a_burst_that_jumps_runs_like_one_with_a_timer_a_frame() -> None:
+    with asyncio.Runner(loop_factory=LoopWithoutJumps) as runner:
+        expected = runner.run(busy_wire())
+    assert len(expected) > 150
+    assert run_virtual(busy_wire()) == expected
 
 
 async def test_the_bit_rate_scales_the_times() -> None:
