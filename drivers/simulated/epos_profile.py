@@ -150,15 +150,18 @@ class Regulator:
 
     def limit(self, current: float, dt_s: float) -> float:
         """A demand [A] within the output limit, or the continuous one while the winding is warm (one thermal mass)."""
-        heat, warm = self._heat_a2, self.continuous_a * self.continuous_a
-        if heat >= warm:
-            self.limited = True
-        elif self.limited and heat < _COOLED * warm:
-            self.limited = False
-        most = self.continuous_a if self.limited and self.continuous_a < self.output_a else self.output_a
+        heat, most = self._heat_a2, self.output_a
+        if self.limited or heat >= self.continuous_a * self.continuous_a:
+            most = self._most_while_warm()
         if current > most:
             current = most
         elif current < -most:
             current = -most
         self._heat_a2 = heat + (current * current - heat) * dt_s / self.winding_s
         return current
+
+    def _most_while_warm(self) -> float:
+        """The limit [A] of a winding that has become warm, until it has cooled."""
+        warm = self.continuous_a * self.continuous_a
+        self.limited = self._heat_a2 >= (_COOLED * warm if self.limited else warm)
+        return min(self.continuous_a, self.output_a) if self.limited else self.output_a

@@ -207,10 +207,11 @@ class Max2dWorld:
         self._shift_x_n += (force_x * self._shift_x - self._shift_x_n) * share
         self._shift_y_n += (force_y * self._shift_y - self._shift_y_n) * share
         back, right, mean = self._shift_x_n, self._shift_y_n, self._mean_load_n
-        self._rear.right.load_n = mean + back + right
-        self._rear.left.load_n = mean + back - right
-        self._front.left.load_n = mean - back - right
-        self._front.right.load_n = mean - back + right
+        rear, front = self._rear, self._front
+        rear.right.load_n = mean + back + right
+        rear.left.load_n = mean + back - right
+        front.left.load_n = mean - back - right
+        front.right.load_n = mean - back + right
 
     def _body_velocity(self) -> tuple[float, float]:
         """Velocity of the centre, forward and left [m/s]."""
