@@ -18,7 +18,7 @@ from drivers.epos.configure import ZERO_TARGETS, EposSetup, emergency_words
 from drivers.epos.objects import OBJECTS
 from drivers.epos.outputs import OutputBits
 from drivers.epos.state_machine import Command, Mode, State, controlword_to, state_of
-from drivers.epos.transitions import StatuswordWaiters
+from drivers.epos.transitions import StatuswordWaiters, Turns
 from drivers.epos.units import WheelUnits
 from profiles.schema import DriveConfig
 
@@ -62,6 +62,7 @@ class EposDrive(CanopenDevice):
         statusword: last one received.
         outputs: its digital outputs.
         waiters: everybody who waits for a statusword of it.
+        turns: its transitions; a stop ends the one under way.
         on_ready_change: called with True when it has become ready, False when it was lost.
     """
 
@@ -85,8 +86,7 @@ class EposDrive(CanopenDevice):
         self._rpdo1, self._rpdo3 = rpdo_cob_id(1, config.node), rpdo_cob_id(3, config.node)
         self._send = master.bus.send
         self._period_s = 1.0 / master.network.cycle_hz
-        self._turn = asyncio.Lock()
-        self._stops = 0
+        self.turns = Turns(self.who, config.node)
         self.waiters = StatuswordWaiters(self.who, config.node)
         master.subscribe(tpdo_cob_id(1, config.node), self._on_tpdo1)
 
@@ -135,6 +135,10 @@ class EposDrive(CanopenDevice):
         self._controlword = controlword
         self.transmit(asyncio.get_running_loop().time() + self._period_s)
 
+    def _command_unless_stopped(self, controlword: int) -> None:
+        self.turns.require_unstopped()
+        self._command(controlword)
+
     def _drop_target(self) -> None:
         self.target_speed_m_s = 0.0
         self._target_rpm = 0
@@ -163,15 +167,14 @@ class EposDrive(CanopenDevice):
 
     def _interrupt(self, error: CanhelmError) -> None:
         """End every transition that is on its way."""
-        self._stops += 1
+        self.turns.stop()
         self.waiters.interrupt(error)
 
-    async def _walk_to(self, target: State, stops: int) -> None:
+    async def _walk_to(self, target: State) -> None:
         while (state := state_of(self.statusword)) is not target:
             if self.state is DriveState.FAULT:
                 raise self.device_fault()
-            if stops != self._stops:
-                raise Refused(f"{self.who} was stopped in the meantime", node=self.node, remedy="enable it again")
+            self.turns.require_unstopped()
             controlword = None if state is None else controlword_to(target, state)
             if controlword is not None:
                 self._command(controlword)
@@ -194,13 +197,12 @@ class EposDrive(CanopenDevice):
         self.require_ready()
         if self.state is DriveState.FAULT:
             raise self.device_fault()
-        async with self._turn:
-            stops = self._stops
+        async with self.turns.take():
             try:
                 await self.enter_mode(self.driving_mode)
-                await self._walk_to(State.OPERATION_ENABLED, stops)
+                await self._walk_to(State.OPERATION_ENABLED)
             except (CanhelmError, asyncio.CancelledError):
-                if stops == self._stops and self.node_state is NodeState.READY:
+                if not self.turns.stopped and self.node_state is NodeState.READY:
                     self._command(Command.DISABLE_VOLTAGE)
                 raise
 
@@ -236,7 +238,7 @@ class EposDrive(CanopenDevice):
             DeviceFault: the drive stays in fault: the cause is still there.
         """
         self.require_ready()
-        async with self._turn:
+        async with self.turns.take():
             if self.state is DriveState.FAULT:
                 await self._reset_edge()
         self.fault = None
@@ -262,9 +264,15 @@ class EposDrive(CanopenDevice):
     # --- modes ---------------------------------------------------------------------------------------------------
 
     async def enter_mode(self, mode: Mode) -> None:
-        """Write zero targets, then the mode, and prove it. Raises DeviceFault where the drive does not take it."""
+        """Write zero targets, then the mode, and prove it.
+
+        Raises:
+            DeviceFault: the drive does not take it.
+            Refused: a stop came in between.
+        """
         self._drop_target()
         await self.write(*ZERO_TARGETS)
+        self.turns.require_unstopped()
         if self.state is DriveState.ENABLED:
             self._command(Command.ENABLE_OPERATION)
         await self.write((OBJECTS["mode_of_operation"], mode))
@@ -296,23 +304,23 @@ class EposDrive(CanopenDevice):
         self.require_ready()
         self._drop_target()
         if self.mode is not self.driving_mode:
-            async with self._turn:
+            async with self.turns.take():
                 await self.enter_mode(self.driving_mode)
 
     async def set_current(self, current_a: float) -> None:
         """See :func:`drivers.epos.moves.set_current`."""
-        async with self._turn:
+        async with self.turns.take():
             await moves.set_current(self, current_a)
 
     async def move_to(self, position_qc: int, *, relative: bool, speed_rpm: float) -> None:
         """See :func:`drivers.epos.moves.move_to`."""
-        async with self._turn:
-            await moves.move_to(self, position_qc, relative, speed_rpm, self._command)
+        async with self.turns.take():
+            await moves.move_to(self, position_qc, relative, speed_rpm, self._command_unless_stopped)
 
     async def home(self, method: int) -> None:
         """See :func:`drivers.epos.moves.home`."""
-        async with self._turn:
-            await moves.home(self, method, self._command)
+        async with self.turns.take():
+            await moves.home(self, method, self._command_unless_stopped)
 
     @property
     def at_target(self) -> bool:

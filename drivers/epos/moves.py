@@ -41,11 +41,11 @@ async def move_to(drive: EposDrive, position_qc: int, relative: bool, speed_rpm:
     Args:
         position_qc: target at the motor, absolute or relative to the present position.
         speed_rpm: motor speed on the way, at most what the profile's top speed makes.
-        command: sends a controlword.
+        command: sends a controlword, unless a stop came in between.
 
     Raises:
         NotReady: not enabled.
-        Refused: it still turns.
+        Refused: it still turns, or a stop came in between.
         LimitExceeded: the speed is zero, negative or above the limit, or the position does not fit 32 bits.
         DeviceFault, Timeout, Aborted, NodeAbsent: the drive did not take it.
     """
@@ -80,7 +80,7 @@ async def home(drive: EposDrive, method: int, command: Commander) -> None:
 
     Args:
         method: number of the method (object 0x6098).
-        command: sends a controlword.
+        command: sends a controlword, unless a stop came in between.
     """
     _require_rest(drive)
     await drive.write((OBJECTS["homing_method"], method))
@@ -99,6 +99,7 @@ async def set_current(drive: EposDrive, current_a: float) -> None:
     Raises:
         NotReady: not enabled.
         LimitExceeded: above the continuous current of the profile.
+        Refused: a stop came in between.
         DeviceFault, Aborted, NodeAbsent: the drive did not take it.
     """
     drive.require_enabled()
@@ -113,4 +114,5 @@ async def set_current(drive: EposDrive, current_a: float) -> None:
         )
     if drive.mode is not Mode.CURRENT:
         await drive.enter_mode(Mode.CURRENT)
+    drive.turns.require_unstopped()
     await drive.write((OBJECTS["current_mode_setting_value"], round(1e3 * current_a)))

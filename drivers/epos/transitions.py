@@ -3,13 +3,53 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 
-from canhelm.errors import CanhelmError, Timeout
+from canhelm.errors import CanhelmError, Refused, Timeout
 from drivers.epos.state_machine import STATE_MASK, STATUSWORD_BITS, State, state_of
 
 TRANSITION_S = 1.0
 """Time that one step to another state may take."""
+
+
+class Turns:
+    """Transitions of one drive, one at a time; a stop ends the one under way and those that wait for their turn.
+
+    Args:
+        who: the drive for people.
+        node: its node id.
+    """
+
+    def __init__(self, who: str, node: int) -> None:
+        self._who = who
+        self._node = node
+        self._lock = asyncio.Lock()
+        self._stops = 0
+        self._asked_at = 0
+
+    @asynccontextmanager
+    async def take(self) -> AsyncIterator[None]:
+        """Have the turn. Raises Refused where a stop came while waiting for it."""
+        asked_at = self._stops
+        async with self._lock:
+            self._asked_at = asked_at
+            self.require_unstopped()
+            yield
+
+    def stop(self) -> None:
+        """Whatever was asked for until now goes no further."""
+        self._stops += 1
+
+    @property
+    def stopped(self) -> bool:
+        """Whether a stop came since the present transition was asked for."""
+        return self._stops != self._asked_at
+
+    def require_unstopped(self) -> None:
+        """Raise Refused where a stop came since the present transition was asked for."""
+        if self.stopped:
+            raise Refused(f"{self._who} was stopped in the meantime", node=self._node, remedy="enable it again")
 
 
 class StatuswordWaiters:
