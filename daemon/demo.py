@@ -17,7 +17,7 @@ from canhelm.errors import Timeout, UsageError
 from daemon.app import App
 from daemon.loops.geometry import solve_turning
 from daemon.loops.odometry import least_squares
-from daemon.runtime.supervisor import VehicleState
+from daemon.runtime.vehicle import VehicleState
 from profiles.schema import PairedSteerGeometry, Profile
 
 BOOT_DEADLINE_S = 20.0

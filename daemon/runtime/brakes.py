@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine
-from typing import Any
+from collections.abc import Awaitable, Callable
 
 from canhelm.errors import CanhelmError, DeviceFault, Interlock
 from daemon.runtime.tasks import TaskSet
-from drivers.contract import Brake, BrakeState, DriveState
+from drivers.contract import Brake, BrakeState, DriveState, NodeState
 from drivers.devices import Devices
 
 
@@ -35,12 +34,14 @@ class BrakeKeeper:
         self._on_failure = on_failure
 
     def follow(self, release: tuple[bool, ...]) -> None:
-        """Make the steering brakes follow what the law asks for."""
+        """Make the steering brakes follow what the law asks for; one whose drive is gone cannot be switched."""
         for brake, wanted in zip(self._steering, release, strict=True):
+            if self._devices.drives[brake.drive].node_state is not NodeState.READY:
+                continue
             if wanted and brake.state not in (BrakeState.RELEASED, BrakeState.RELEASING):
-                self._tasks.spawn(self._switch(brake, brake.release()), "brake")
+                self._tasks.spawn(self._switch(brake, brake.release), "brake")
             elif not wanted and brake.state not in (BrakeState.ENGAGED, BrakeState.ENGAGING):
-                self._tasks.spawn(self._switch(brake, brake.engage()), "brake")
+                self._tasks.spawn(self._switch(brake, brake.engage), "brake")
 
     def on_halt(self) -> None:
         """A stop was commanded: lock the headings now, and hold the axes whose drives have no torque any more.
@@ -50,7 +51,7 @@ class BrakeKeeper:
         self.follow((False,) * len(self._steering))
         for brake in self._holding:
             if self._devices.drives[brake.drive].state is DriveState.FAULT:
-                self._tasks.spawn(self._switch(brake, brake.engage()), "brake")
+                self._tasks.spawn(self._switch(brake, brake.engage), "brake")
 
     def require_released(self, drives: tuple[str, ...]) -> None:
         """Raise Interlock where a holding brake would have to be moved against."""
@@ -65,11 +66,11 @@ class BrakeKeeper:
         """Engage the holding brakes of an axis, before its drive is switched off."""
         for brake in self._holding:
             if brake.drive == drive:
-                await self._switch(brake, brake.engage())
+                await self._switch(brake, brake.engage)
 
-    async def _switch(self, brake: Brake, switching: Coroutine[Any, Any, None]) -> None:
+    async def _switch(self, brake: Brake, switch: Callable[[], Awaitable[None]]) -> None:
         try:
-            await switching
+            await switch()
         except CanhelmError as error:
             self._on_failure(
                 DeviceFault(

@@ -9,7 +9,6 @@ import asyncio
 import itertools
 import logging
 from collections.abc import Callable, Coroutine
-from enum import StrEnum
 from typing import Any
 
 from canhelm.errors import CanhelmError, DeviceFault, EmergencyStop, NotReady, Refused
@@ -20,7 +19,7 @@ from daemon.runtime.leases import Leases
 from daemon.runtime.motions import Motion
 from daemon.runtime.rest import AT_REST_M_S, RestWatch
 from daemon.runtime.tasks import TaskSet
-from daemon.runtime.vehicle import Vehicle
+from daemon.runtime.vehicle import Vehicle, VehicleState
 from daemon.runtime.watch import DeviceWatch
 from drivers.canopen.master import Master, NodeEvent
 from drivers.contract import Device, Drive, DriveState, NodeState
@@ -29,18 +28,9 @@ from drivers.devices import Devices
 LOGGER = logging.getLogger("canhelm")
 MOTION = "motion"
 """Name of the tasks that carry out motions."""
-
-
-class VehicleState(StrEnum):
-    """What the vehicle does, for people and programs."""
-
-    WAITING = "waiting"
-    BOOTING = "booting"
-    IDLE = "idle"
-    ACTIVE = "active"
-    STOPPING = "stopping"
-    FAULT = "fault"
-    ESTOP = "estop"
+STOP = "stop"
+"""Name of the tasks that switch every power stage off."""
+POWERLESS = (DriveState.DISABLED, DriveState.UNKNOWN, DriveState.FAULT)
 
 
 class Supervisor:
@@ -73,8 +63,10 @@ class Supervisor:
         self._watch = DeviceWatch(devices, period_s)
         self._estop_reason = ""
         self._fault: DeviceFault | None = None
+        self._latched = 0
         self._halting = 0
-        self.brakes = BrakeKeeper(devices, vehicle.brakes, self._tasks, self.fault)
+        self._closing = False
+        self.brakes = BrakeKeeper(devices, vehicle.brakes, self._tasks, self._on_brake_failure)
         master.on_event = self._on_node_event
 
     # --- state -------------------------------------------------------------------------------------------------
@@ -108,8 +100,7 @@ class Supervisor:
     @property
     def anything_enabled(self) -> bool:
         """True while any drive has its power stage on."""
-        off = (DriveState.DISABLED, DriveState.UNKNOWN, DriveState.FAULT)
-        return any(drive.state not in off for drive in self.devices.drives.values())
+        return any(drive.state not in POWERLESS for drive in self.devices.drives.values())
 
     def _not_ready(self) -> list[Device]:
         return [device for device in self.devices.by_node.values() if device.node_state is not NodeState.READY]
@@ -125,6 +116,8 @@ class Supervisor:
             )
         if self._fault is not None:
             raise NotReady(f"the vehicle is in fault: {self._fault.message}", remedy="`canhelm reset`")
+        if self._closing:
+            raise NotReady("the daemon is going down", remedy="start it again")
         if self._halting:
             raise NotReady("the vehicle is stopping", remedy="wait until it is at rest")
         for name in drives:
@@ -167,6 +160,7 @@ class Supervisor:
             motion.fail(error)
         finally:
             motion.running = False
+            motion.fail(Refused("the motion was cut short by a defect of the daemon", remedy="report it with the log"))
             await self._leave_as_found(drives, enabled_here)
             self.motions.pop(motion.identity, None)
             motion.closed.set()
@@ -177,7 +171,7 @@ class Supervisor:
             if drive.node_state is not NodeState.READY or drive.state in (DriveState.FAULT, DriveState.UNKNOWN):
                 continue
             try:
-                if drive in enabled_here or self._fault is not None or self._estop_reason:
+                if drive in enabled_here or self._fault is not None or self._estop_reason or self._closing:
                     await self.power_off(drive)
                 elif drive.state is not DriveState.ENABLED:
                     await drive.enable()
@@ -197,34 +191,45 @@ class Supervisor:
             if self._fault is None and not self._estop_reason:
                 for drive in self.devices.drives.values():
                     if drive.state is DriveState.QUICK_STOP:
-                        await drive.enable()
+                        await self._try(drive.name, drive.enable())
         finally:
             self._halting -= 1
 
     def estop(self, reason: str) -> None:
         """Emergency stop: quick stop, then every power stage off; latched until :meth:`reset`."""
+        self._latched += 1
         self._estop_reason = self._estop_reason or reason
         self._halt(EmergencyStop(f"emergency stop: {reason}", remedy="`canhelm reset` when it is safe"))
         self.log.add(
             "error", "supervisor", f"emergency stop: {reason}", "make sure that it is safe, then `canhelm reset`"
         )
-        self._tasks.spawn(self._stop_and_disable(), "stop")
+        self._tasks.spawn(self._stop_and_disable(), STOP)
 
     def fault(self, error: DeviceFault) -> None:
         """A fault that stops the vehicle: quick stop, brakes, power off; latched until :meth:`reset`."""
+        self._latched += 1
         if self._fault is None and not self._estop_reason:
             self._fault = error
         self._halt(error)
         self.log.add("error", f"node {error.node}" if error.node else "supervisor", error.message, error.remedy or "")
-        self._tasks.spawn(self._stop_and_disable(), "stop")
+        self._tasks.spawn(self._stop_and_disable(), STOP)
 
     async def reset(self) -> dict[str, Any]:
-        """Clear the latched emergency stop and faults. Raises DeviceFault where a cause is still there."""
+        """Clear the latched emergency stop and faults.
+
+        Raises:
+            DeviceFault: a cause is still there.
+            Refused: the vehicle was stopped again in the meantime; that stop stays latched.
+        """
+        latched = self._latched
         if self._fault is not None or self._estop_reason:
             await self._settled()
+            await self._tasks.wait(STOP)
         for drive in self.devices.drives.values():
             if drive.node_state is NodeState.READY and drive.state is DriveState.FAULT:
                 await drive.reset_fault()
+        if latched != self._latched:
+            raise Refused(f"stopped again during the reset: {self.message}", remedy="`canhelm reset` when it is safe")
         for device in self.devices.by_node.values():
             device.fault = None
         if self._fault is not None or self._estop_reason:
@@ -234,9 +239,9 @@ class Supervisor:
         return {"state": self.state.value, "message": self.message}
 
     def _halt(self, error: CanhelmError) -> None:
-        """Command the stop, now: RPDO3 to every drive that has power, brakes to engage, motions over."""
+        """Command the stop, now: RPDO3 to every drive that has power or is about to, brakes to engage, motions over."""
         for drive in self.devices.drives.values():
-            if drive.node_state is NodeState.READY and drive.state in (DriveState.ENABLED, DriveState.ENABLING):
+            if drive.node_state is NodeState.READY and drive.state is not DriveState.FAULT:
                 drive.quick_stop()
         self._rest.begin_anew()
         self.command = self.vehicle.zero
@@ -249,7 +254,7 @@ class Supervisor:
         try:
             await self._settled()
             for drive in self.devices.drives.values():
-                if drive.node_state is NodeState.READY and drive.state in (DriveState.QUICK_STOP, DriveState.ENABLED):
+                if drive.node_state is NodeState.READY and drive.state not in POWERLESS:
                     await self._try(drive.name, self.power_off(drive))
         finally:
             self._halting -= 1
@@ -286,9 +291,9 @@ class Supervisor:
         self._watch_leases(now_s)
         self._watch_devices(now_s)
         wanted = self._ask_motions(measurement, dt_s)
-        if wanted.release_brake:
-            self.brakes.follow(wanted.release_brake)
         self.command, self.active_limits = self.vehicle.gate(wanted, measurement, self.command, dt_s)
+        if self.command.release_brake:
+            self.brakes.follow(self.command.release_brake)
         deadline = now_s + self._period_s
         for drive, speed in zip(self.vehicle.drives, self.command.wheel_speed_m_s, strict=True):
             if drive.node_state is NodeState.READY:
@@ -361,6 +366,13 @@ class Supervisor:
 
     # --- the end -----------------------------------------------------------------------------------------------
 
+    def _on_brake_failure(self, error: DeviceFault) -> None:
+        """A fault, unless one has stopped the vehicle already: its stop switches the brakes once more."""
+        if self._fault is None and not self._estop_reason:
+            self.fault(error)
+        else:
+            self.log.add("error", "supervisor", error.message, error.remedy or "")
+
     def _on_task_failure(self, name: str, error: BaseException) -> None:
         self.fault(DeviceFault(f"the daemon's {name} task failed: {error}", remedy="report it with the log"))
 
@@ -372,8 +384,10 @@ class Supervisor:
 
     async def close(self) -> None:
         """Bring the vehicle to rest, switch every power stage off, and end all tasks."""
-        if self._powered:
-            self._halt(Refused("the motion was stopped: the daemon is going down"))
+        self._closing = True
+        powered = self._powered
+        self._halt(Refused("the motion was stopped: the daemon is going down"))
+        if powered:
             await self._stop_and_disable()
         await self._tasks.close()
 

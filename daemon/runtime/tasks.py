@@ -20,9 +20,13 @@ class TaskSet:
     def __init__(self, on_failure: Callable[[str, BaseException], None]) -> None:
         self._tasks: set[asyncio.Task[None]] = set()
         self._on_failure = on_failure
+        self._closed = False
 
     def spawn(self, work: Coroutine[Any, Any, None], name: str) -> None:
-        """Run a coroutine as a task."""
+        """Run a coroutine as a task; not at all once this set was closed."""
+        if self._closed:
+            work.close()
+            return
         task = asyncio.get_running_loop().create_task(work, name=name)
         self._tasks.add(task)
         task.add_done_callback(self._done)
@@ -35,6 +39,7 @@ class TaskSet:
 
     async def close(self) -> None:
         """Cancel all and wait for their ends."""
+        self._closed = True
         for task in self._tasks:
             task.cancel()
         if self._tasks:

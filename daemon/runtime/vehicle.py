@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from enum import StrEnum
 from typing import Any
 
 from daemon.loops.limits import Gate
@@ -10,6 +11,18 @@ from daemon.loops.measurement import Command, Measurement
 from daemon.runtime.motions import Motion
 from drivers.contract import Brake, BrakeState, Drive, SteeringEncoder
 from profiles.schema import Profile
+
+
+class VehicleState(StrEnum):
+    """What the vehicle does, for people and programs."""
+
+    WAITING = "waiting"
+    BOOTING = "booting"
+    IDLE = "idle"
+    ACTIVE = "active"
+    STOPPING = "stopping"
+    FAULT = "fault"
+    ESTOP = "estop"
 
 
 class Vehicle(ABC):

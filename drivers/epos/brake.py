@@ -70,7 +70,7 @@ class EposBrake:
             self.state = moving
             try:
                 await self._on.outputs.switch(self._config.output_bit, self._level(engaged=there is BrakeState.ENGAGED))
-            except CanhelmError:
+            except (CanhelmError, asyncio.CancelledError):
                 self._settle(None)
                 self.state = BrakeState.UNKNOWN
                 raise

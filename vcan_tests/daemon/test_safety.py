@@ -1,0 +1,122 @@
+"""A whole simulated MAX2D: no motor turns without a live command, at whatever moment something breaks or cuts in."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import pytest
+
+from canhelm.errors import CanhelmError, DeviceFault, NotReady, Refused
+from drivers.contract import BrakeState
+from drivers.simulated.epos import SimulatedEpos
+from vcan_tests.robot import Robot, running_robot
+
+MOMENTS_S = (0.001, 0.004, 0.008, 0.012, 0.03, 0.06)
+"""From the first SDO of enabling a drive to its enabled state."""
+
+
+def _begin(robot: Robot, method: str, **params: Any) -> asyncio.Task[Any]:
+    """A command of a client that takes its answer, error or not, for what it is."""
+
+    async def ask() -> dict[str, Any] | CanhelmError:
+        try:
+            return await robot.call(method, **params)
+        except CanhelmError as error:
+            return error
+
+    return asyncio.create_task(ask())
+
+
+def _twin(robot: Robot, node: int) -> SimulatedEpos:
+    twin = robot.network.node(node)
+    assert isinstance(twin, SimulatedEpos)
+    return twin
+
+
+async def _until_front_brake_is_free(robot: Robot) -> asyncio.Task[Any]:
+    steering = _begin(robot, "steer", pair="front", angle_deg=40.0)
+    await robot.until(lambda: robot.app.devices.brakes["front"].state is BrakeState.RELEASED)
+    return steering
+
+
+async def test_a_drive_lost_while_its_brake_is_released_is_one_fault_and_not_endless_ones() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        steering = await _until_front_brake_is_free(robot)
+        robot.network.power_off("front_left")
+        error = await steering
+        assert isinstance(error, DeviceFault)
+        assert "front_left" in error.message
+        assert robot.fastest_wheel_m_s < 0.01
+        assert len(robot.app.supervisor.log.events) < 30
+
+
+async def test_a_brake_whose_switching_was_cancelled_can_be_switched_again() -> None:
+    async with running_robot() as robot:
+        brake = robot.app.devices.brakes["front"]
+        releasing = asyncio.create_task(brake.release())
+        await asyncio.sleep(0)
+        releasing.cancel()
+        await asyncio.wait([releasing])
+        await asyncio.wait_for(brake.engage(), 1.0)
+        assert brake.state is BrakeState.ENGAGED
+
+
+@pytest.mark.parametrize("moment_s", MOMENTS_S)
+async def test_an_emergency_stop_while_a_drive_is_being_enabled_leaves_it_off(moment_s: float) -> None:
+    async with running_robot(expect_errors=True) as robot:
+        enabling = _begin(robot, "motor.enable", node=1)
+        second = _begin(robot, "motor.enable", node=1)
+        await asyncio.sleep(moment_s)
+        await robot.call("estop")
+        await asyncio.wait([enabling, second])
+        await asyncio.sleep(1.0)
+        assert not _twin(robot, 1).motion.powered
+
+
+@pytest.mark.parametrize("moment_s", MOMENTS_S)
+async def test_a_stop_while_a_move_is_being_prepared_keeps_it_from_beginning(moment_s: float) -> None:
+    async with running_robot() as robot:
+        await robot.call("motor.enable", node=1)
+        axis = robot.network.world.axes["rear_right"]
+        before_rad = axis.position_rad
+        moving = _begin(robot, "motor.position", node=1, position_qc=20_000, relative=True, velocity_rpm=1.0)
+        await asyncio.sleep(moment_s)
+        await robot.call("stop")
+        assert isinstance(await moving, Refused)
+        await asyncio.sleep(1.0)
+        assert abs(axis.position_rad - before_rad) < 0.02
+        await robot.call("motor.disable", node=1)
+
+
+async def test_an_emergency_stop_during_a_reset_stays_latched() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        _twin(robot, 2).trigger_fault(0x4210)
+        await robot.until(lambda: robot.state == "fault")
+        resetting = _begin(robot, "reset")
+        await asyncio.sleep(0.05)
+        await robot.call("estop")
+        assert isinstance(await resetting, Refused)
+        assert robot.state == "estop"
+        assert (await robot.call("reset"))["state"] == "idle"
+
+
+async def test_a_reset_right_after_an_emergency_stop_returns_when_the_vehicle_can_be_driven_again() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        driving = _begin(robot, "drive.parallel", angle_deg=0.0, speed_m_s=0.4, duration_s=5.0)
+        await robot.until(lambda: robot.speed_m_s > 0.38)
+        await robot.call("estop")
+        assert (await robot.call("reset"))["state"] == "idle"
+        await driving
+        await robot.call("steer", pair="front", angle_deg=1.0)
+
+
+async def test_nothing_begins_while_the_daemon_goes_down() -> None:
+    async with running_robot() as robot:
+        enabling = _begin(robot, "motor.enable", node=1)
+        await asyncio.sleep(0.004)
+        closing = asyncio.create_task(robot.app.supervisor.close())
+        await asyncio.wait([enabling, closing])
+        with pytest.raises(NotReady, match="going down"):
+            await robot.call("steer", pair="front", angle_deg=1.0)
+        assert not _twin(robot, 1).motion.powered
