@@ -221,11 +221,14 @@ class EposDrive(CanopenDevice):
             )
 
     def quick_stop(self) -> None:
-        """Command the quick stop at once by RPDO3; RPDO1 follows, so that no cycle enables the drive again."""
+        """Command the quick stop at once by RPDO3; RPDO1 follows, so that no cycle enables the drive again.
+
+        A drive that is off is kept from being enabled; it needs no frame for that.
+        """
         self._interrupt(Refused(f"{self.who} was stopped in the meantime", node=self.node, remedy="enable it again"))
         self._drop_target()
         self._controlword = int(Command.QUICK_STOP)
-        if self.node_state is NodeState.READY:
+        if self.node_state is NodeState.READY and self.state is not DriveState.DISABLED:
             soon_s = asyncio.get_running_loop().time() + self._period_s
             self._send(self._rpdo3, make_rpdo3(Command.QUICK_STOP, self.mode), soon_s)
             self.transmit(soon_s)
