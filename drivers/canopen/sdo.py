@@ -218,13 +218,14 @@ class SdoClient:
                 return answer.data[: size or 4] if not answer.sized else answer.data
             return await self._upload_segments(timeout)
 
-    async def write_raw(self, obj: SdoObject, data: bytes) -> None:
+    async def write_raw(self, obj: SdoObject, data: bytes, timeout_s: float | None = None) -> None:
         """Write the little-endian bytes of an object; raises as :meth:`write` does."""
         async with self._turn:
             self._object = obj
-            await self._exchange(make_download(*_address(obj), data), AnswerKind.DOWNLOAD, 0, self._timeout_s)
+            timeout = timeout_s or self._timeout_s
+            await self._exchange(make_download(*_address(obj), data), AnswerKind.DOWNLOAD, 0, timeout)
             if not 1 <= len(data) <= 4:
-                await self._download_segments(data)
+                await self._download_segments(data, timeout)
 
     async def _upload_segments(self, timeout_s: float) -> bytes:
         value, toggle, last = bytearray(), 0, False
@@ -238,11 +239,11 @@ class SdoClient:
             toggle, last = toggle ^ 1, answer.last
         return bytes(value)
 
-    async def _download_segments(self, data: bytes) -> None:
+    async def _download_segments(self, data: bytes, timeout_s: float) -> None:
         toggle = 0
         for start in range(0, max(len(data), 1), 7):
             request = make_download_segment(data[start : start + 7], toggle, start + 7 >= len(data))
-            await self._segment(request, AnswerKind.DOWNLOAD_SEGMENT, toggle, self._timeout_s)
+            await self._segment(request, AnswerKind.DOWNLOAD_SEGMENT, toggle, timeout_s)
             toggle ^= 1
 
     async def _segment(self, request: bytes, kind: AnswerKind, toggle: int, timeout_s: float) -> SdoAnswer:
