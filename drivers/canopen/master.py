@@ -12,6 +12,8 @@ from drivers.bus.contract import Bus, FrameHandler
 from drivers.canopen.codes import NmtCommand
 from drivers.canopen.counters import CanopenCounters
 from drivers.canopen.guarding import REPEAT_AFTER, Guard
+from drivers.canopen.lss import ANSWER_COB_ID as LSS_ANSWER_COB_ID
+from drivers.canopen.lss import LssMaster
 from drivers.canopen.nmt import NMT_COB_ID, SYNC_COB_ID, make_nmt
 from drivers.canopen.sdo import ANSWER_COB_ID, SdoClient
 from profiles.schema import Network
@@ -49,6 +51,7 @@ class Master:
 
     Attributes:
         counters: what was dropped.
+        lss: sets node ids and bit rates of devices.
         names: how people call the nodes, by node id.
         on_event: told of everything that happens to a node.
     """
@@ -64,6 +67,8 @@ class Master:
         self._clients: dict[int, SdoClient] = {}
         self._guards: dict[int, Guard] = {}
         self._commanded: dict[int, Callable[[NmtCommand], None]] = {}
+        self.lss = LssMaster(bus.send, network.sdo_timeout_s, self.counters)
+        self.subscribe(LSS_ANSWER_COB_ID, self.lss.receive)
         bus.receiver = self._receive
 
     async def start(self) -> None:

@@ -74,10 +74,10 @@ class SimulatedDictionary:
         kept: Iterable[str] = (),
     ) -> None:
         self.table = table
-        self.node_id = node_id
+        self._factory_by_name = factory
         self.objects = {(o.index, o.sub): o for o in table.objects if o.firmware == "2011h"}
         self._indices = {index for index, _ in self.objects}
-        self._factory = {address: self._default(entry, factory) for address, entry in self.objects.items()}
+        self.take_node_id(node_id)
         writable = {address for address, entry in self.objects.items() if entry.access is Access.RW}
         self._parameters = writable - {self.address(n) for n in volatile} | {self.address(n) for n in kept}
         self._stored: dict[Address, Value] = {}
@@ -86,8 +86,13 @@ class SimulatedDictionary:
         self.checks: dict[Address, Callable[[int], None]] = {}
         self.actions: dict[Address, Callable[[int], None]] = {}
 
-    def _default(self, entry: ObjectDef, factory: dict[str, Value]) -> Value:
-        value = factory.get(entry.name, entry.default)
+    def take_node_id(self, node_id: int) -> None:
+        """Change the node id; the defaults that depend on it count from the next restart on."""
+        self.node_id = node_id
+        self._factory = {address: self._default(entry) for address, entry in self.objects.items()}
+
+    def _default(self, entry: ObjectDef) -> Value:
+        value = self._factory_by_name.get(entry.name, entry.default)
         if value is None:
             return _EMPTY.get(entry.type, 0)
         return value + self.node_id if entry.plus_node_id and isinstance(value, int) else value

@@ -11,11 +11,16 @@ from drivers.canopen.codes import NmtState
 from drivers.encoder.objects import MULTI_TURN, OBJECTS, SINGLE_TURN
 from drivers.simulated.bus import SimulatedPort
 from drivers.simulated.dictionary import TOO_HIGH, SdoAbort, SimulatedDictionary, Value
-from drivers.simulated.node import SimulatedNode
+from drivers.simulated.lss_slave import UNCONFIGURED, LssSlave
+from drivers.simulated.node import Handler, SimulatedNode
 from drivers.simulated.world import World
 from profiles.schema import EncoderConfig
 
-_GUARDING = 0x700
+_GUARDING, _LSS_REQUEST, _LSS_ANSWER = 0x700, 0x7E5, 0x7E4
+_IDENTITY = ("vendor_id", "product_code", "revision_number", "identity_serial_number")
+_FACTORY_IDENTITY = (0x0000_0000, 0x0406_1000, 0x0001_0002)
+"""Vendor 0, which CiA gave to nobody; product and revision are assumed."""
+_FIRST_SERIAL = 0x2026_0000
 _REVERSED, _SCALED = 1 << 0, 1 << 2
 _POSITION_ALARM = 0x5000
 _ALARMS = struct.Struct("<HH")
@@ -66,6 +71,9 @@ class SimulatedEncoder(SimulatedNode):
         pair: name by which the world knows the wheel pair.
         world: the physics.
         boot_delay_s: time from power-up to the boot-up message.
+
+    Attributes:
+        lss: its LSS slave, with node id and bit rate that it has stored.
     """
 
     def __init__(
@@ -73,6 +81,7 @@ class SimulatedEncoder(SimulatedNode):
     ) -> None:
         turns = max(1, (config.total_counts or config.counts_per_turn) // config.counts_per_turn)
         factory: dict[str, Value] = {
+            **dict(zip(_IDENTITY, (*_FACTORY_IDENTITY, _FIRST_SERIAL + config.node), strict=True)),
             "device_type": SINGLE_TURN if turns == 1 else MULTI_TURN,
             "device_name": "CiA 406 encoder",
             "save_all_parameters": 1,
@@ -87,6 +96,8 @@ class SimulatedEncoder(SimulatedNode):
         self._pair = pair
         self._world = world
         self._alarms = 0
+        identity = (*_FACTORY_IDENTITY, _FIRST_SERIAL + config.node)
+        self.lss = LssSlave(identity, config.node, self._lss_ended)
         self._cyclic = Periodic(self._send_cyclic)
         self._heartbeat = Periodic(self._send_heartbeat)
         super().__init__(
@@ -160,6 +171,30 @@ class SimulatedEncoder(SimulatedNode):
     def before_access(self, now_s: float) -> None:
         """Bring the world up to this moment."""
         self._world.advance(now_s)
+
+    def before_start(self, whole: bool) -> None:
+        """Node id and bit rate come from LSS."""
+        if whole:
+            self.lss.power_up()
+        else:
+            self.lss.reset_communication()
+        self.take_node_id(self.lss.node_id)
+        self.port.bit_rate = self.lss.bit_rate or self.port.bit_rate
+
+    def services(self) -> dict[int, Handler]:
+        """LSS is served while no process data flows; a device without a node id has nothing else to do."""
+        silent = self.nmt_state is NmtState.BOOT_UP and self.node_id != UNCONFIGURED
+        return {} if silent or self.nmt_state is NmtState.OPERATIONAL else {_LSS_REQUEST: self._on_lss}
+
+    def _on_lss(self, data: bytes, _: float) -> None:
+        answer = self.lss.answer(data)
+        if answer is not None:
+            self.port.send(_LSS_ANSWER, answer)
+
+    def _lss_ended(self) -> None:
+        """A device that had no node id and was given one starts by itself (CiA 305)."""
+        if self.node_id == UNCONFIGURED and self.lss.pending != UNCONFIGURED:
+            self.reset_communication()
 
     def application_stopped(self) -> None:
         """Power lost or reset."""

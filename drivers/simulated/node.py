@@ -20,6 +20,7 @@ from drivers.simulated.sdo_server import SdoServer
 
 _NMT, _SYNC, _EMCY, _SDO_ANSWER, _SDO_REQUEST, _GUARDING = 0x000, 0x080, 0x080, 0x580, 0x600, 0x700
 _EMERGENCY = struct.Struct("<HB5s")
+_HIGHEST_NODE_ID = 127
 _COMMUNICATION_RESET_S = 0.005
 """Time that an NMT reset communication takes (assumed)."""
 _COMMANDS = {int(command): command for command in NmtCommand}
@@ -49,7 +50,7 @@ class SimulatedNode:
 
     Args:
         port: its connection to the bus.
-        node_id: 1 to 127.
+        node_id: 1 to 127; 255 for a device that was given none and keeps silent.
         dictionary: its objects.
         receive_pdos, transmit_pdos: how many it has.
         boot_delay_s: time from power-up or reset to the boot-up message.
@@ -101,6 +102,13 @@ class SimulatedNode:
     def before_access(self, now_s: float) -> None:
         """Called before objects are read or written: bring the simulated world up to this moment."""
 
+    def before_start(self, whole: bool) -> None:
+        """Called before the node starts anew: from power-up or a reset (``whole``), or its communication alone."""
+
+    def services(self) -> dict[int, Handler]:
+        """Handlers of what the device listens to beside CiA 301, in its present state, by identifier."""
+        return {}
+
     def application_started(self) -> None:
         """Called when the node has restarted, with the values of power-up in the dictionary."""
 
@@ -112,6 +120,11 @@ class SimulatedNode:
 
     def master_lost(self) -> None:
         """Called when life guarding finds the master gone."""
+
+    def take_node_id(self, node_id: int) -> None:
+        """Change the node id, for :meth:`before_start`."""
+        self.node_id = node_id
+        self.dictionary.take_node_id(node_id)
 
     # Power
 
@@ -131,6 +144,7 @@ class SimulatedNode:
 
     def _restart(self) -> None:
         self._halt()
+        self.before_start(True)
         self.dictionary.restart()
         self.error_register = 0
         self.error_history.clear()
@@ -150,8 +164,10 @@ class SimulatedNode:
         self._sdo.reset()
         self._enter(NmtState.BOOT_UP)
 
-    def _reset_communication(self) -> None:
+    def reset_communication(self) -> None:
+        """Start the communication anew, as NMT reset communication does."""
         self._stop_communication()
+        self.before_start(False)
         self.dictionary.restart(communication_only=True)
         loop = asyncio.get_running_loop()
         self._boot_timer = loop.call_later(_COMMUNICATION_RESET_S, self._boot, False)
@@ -160,6 +176,9 @@ class SimulatedNode:
         self._boot_timer = None
         if whole:
             self.application_started()
+        if self.node_id > _HIGHEST_NODE_ID:
+            self._listen()
+            return
         self.port.send(_GUARDING + self.node_id, bytes((NmtState.BOOT_UP,)))
         self._enter(NmtState.PRE_OPERATIONAL)
 
@@ -180,7 +199,7 @@ class SimulatedNode:
 
     def _listen(self) -> None:
         """Handle what the NMT state allows (CiA 301 7.3.2.2) by identifier."""
-        state, handlers = self.nmt_state, dict[int, Handler]()
+        state, handlers = self.nmt_state, self.services()
         if state is not NmtState.BOOT_UP:
             handlers[_NMT] = self._on_nmt
             handlers[_GUARDING + self.node_id | RTR_FLAG] = self._on_guard_request
@@ -264,7 +283,7 @@ class SimulatedNode:
         if command is NmtCommand.RESET_NODE:
             self._restart()
         elif command is NmtCommand.RESET_COMMUNICATION:
-            self._reset_communication()
+            self.reset_communication()
         elif _STATES[command] is not self.nmt_state:
             self._enter(_STATES[command])
 
