@@ -24,6 +24,7 @@ Positive = Annotated[float, Meta(gt=0)]
 NotNegative = Annotated[float, Meta(ge=0)]
 Efficiency = Annotated[float, Meta(gt=0, le=1)]
 Counts = Annotated[int, Meta(ge=0, le=2**32 - 1)]
+Gain = Annotated[int, Meta(ge=0, le=32767)]
 
 
 class Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -64,6 +65,25 @@ class Motor(Part, frozen=True, kw_only=True):
     """Of the winding (object 0x6410/5)."""
 
 
+class Gains(Part, frozen=True, kw_only=True):
+    """Regulator gains in the drive's units; what is left out stays as it is in the drive."""
+
+    current_p: Gain | None = None
+    """Object 0x60F6/1."""
+    current_i: Gain | None = None
+    """Object 0x60F6/2."""
+    velocity_p: Gain | None = None
+    """Object 0x60F9/1."""
+    velocity_i: Gain | None = None
+    """Object 0x60F9/2."""
+    position_p: Gain | None = None
+    """Object 0x60FB/1."""
+    position_i: Gain | None = None
+    """Object 0x60FB/2."""
+    position_d: Gain | None = None
+    """Object 0x60FB/3."""
+
+
 class DriveConfig(Part, frozen=True, kw_only=True):
     """One drive with its motor, gear, encoder and wheel."""
 
@@ -72,6 +92,8 @@ class DriveConfig(Part, frozen=True, kw_only=True):
     motor: Motor
     encoder_pulses_per_turn: Annotated[int, Meta(ge=16, le=7500)]
     """Pulses; quad counts (qc) are four times as many."""
+    position_sensor: Literal["encoder_with_index", "encoder", "hall"] = "encoder_with_index"
+    """Sensor on the motor's shaft (object 0x2210/2)."""
     gear_ratio: Positive
     """Motor turns per turn of the gear's output."""
     gear_efficiency: Efficiency = 1.0
@@ -94,6 +116,8 @@ class DriveConfig(Part, frozen=True, kw_only=True):
     """Highest current for a short time (object 0x6410/2)."""
     max_following_error_qc: Counts = 2000
     """Difference between demanded and actual position at which the drive faults (object 0x6065)."""
+    gains: Gains | None = None
+    """Regulator gains; None: as they are in the drive."""
 
     @property
     def qc_per_motor_turn(self) -> int:

@@ -86,7 +86,8 @@ class NodeBoot:
         """From waiting for the node to losing it, or to the next attempt."""
         await self._wait_for_node()
         try:
-            await self._configure()
+            async with self._device.configuring:
+                await self._configure()
         except (Refused, Aborted, DeviceFault) as error:
             self._fail(NodeState.REFUSED, "refused", "error", error.message, error.remedy or "")
             await self._pause(REFUSED_PAUSE_S)

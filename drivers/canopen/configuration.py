@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterable
+from typing import NamedTuple
 
 from canhelm.errors import Refused
 from drivers.canopen.objects import ObjectDef
@@ -13,6 +14,17 @@ BREATH_S = 0.001
 """Pause after each object: the identifiers of guarding have the lowest priority, and must get through all the same."""
 
 DIFFERS = "switch the device off and on; if it happens again, check its type and firmware"
+
+
+class Difference(NamedTuple):
+    """An object whose value is not the expected one."""
+
+    entry: ObjectDef
+    found: int
+    expected: int
+
+    def __str__(self) -> str:
+        return f"{self.entry.address} ({self.entry.name}) is {_words(self.found)}, expected {_words(self.expected)}"
 
 
 class Configuration:
@@ -43,13 +55,18 @@ class Configuration:
         found = await self._sdo.read_int(entry)
         if found & mask != expected & mask:
             raise Refused(
-                f"{self._who}: {entry.address} ({entry.name}) is {_words(found)}, expected {_words(expected)}",
+                f"{self._who}: {Difference(entry, found, expected)}",
                 node=self._sdo.node,
                 object=entry.address,
                 value=found,
                 limit=expected,
                 remedy=remedy,
             )
+
+    async def differences(self, settings: Iterable[tuple[ObjectDef, int]]) -> list[Difference]:
+        """Read objects and tell which differ. Raises NodeAbsent, Timeout, Aborted or DeviceFault."""
+        read = [Difference(entry, await self._sdo.read_int(entry), expected) for entry, expected in settings]
+        return [difference for difference in read if difference.found != difference.expected]
 
     async def verify(self) -> None:
         """Read everything back that was written. Raises Refused at the first object that differs."""

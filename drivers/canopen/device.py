@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Awaitable, Callable
@@ -35,6 +36,7 @@ class CanopenDevice(ABC):
     Attributes:
         reading_time_s: loop time of the last cyclic reading; ``-inf`` before the first.
         on_reading: called with the node id after each cyclic reading.
+        configuring: held by whoever configures it: its boot-up, or a person's command.
     """
 
     kind = ""
@@ -47,6 +49,7 @@ class CanopenDevice(ABC):
         self.fault: Fault | None = None
         self.reading_time_s = -math.inf
         self.on_reading: Callable[[int], None] | None = None
+        self.configuring = asyncio.Lock()
         self.master = master
         master.names[node] = name
         self.sdo = master.sdo(node)

@@ -1,21 +1,20 @@
-"""What a profile means for the objects of an EPOS 24/5, and the steps that write it and prove it."""
+"""The steps that write a profile's configuration to an EPOS 24/5, and prove it."""
 
 from __future__ import annotations
 
 import asyncio
-import math
 
 from canhelm.errors import Refused
 from drivers.canopen.configuration import Configuration
 from drivers.canopen.device import Step
-from drivers.canopen.pdo import AT_ONCE, ON_SYNC, Settings, rpdo_settings, tpdo_settings
+from drivers.canopen.pdo import Settings
 from drivers.canopen.sdo import SdoClient
-from drivers.epos.codec import DRIVING_MODES, RPDO1_MAPS, TPDO1_MAP
+from drivers.epos.codec import DRIVING_MODES
 from drivers.epos.codes import EMERGENCIES
 from drivers.epos.objects import OBJECTS
 from drivers.epos.outputs import OutputBits
+from drivers.epos.parameters import guarding_plan, parameter_plan, pdo_plan, start_up_plan
 from drivers.epos.state_machine import Command, state_of
-from drivers.epos.units import WheelUnits
 from profiles.schema import DriveConfig, Network
 
 DEVICE_TYPE = 0x0020_0192
@@ -23,8 +22,6 @@ VENDOR_MAXON = 0xFB
 HARDWARE_24_5, HARDWARE_MASK = 0x6210, 0xFFF0
 OLDEST_FIRMWARE = 0x2010
 """Before it the digital outputs and the RS-232 protocol were different (Firmware Specification 15.4)."""
-MOTOR_TYPES = {"brushed_dc": 1, "brushless_sine": 10, "brushless_block": 11}
-OVERSPEED_MARGIN = 1.2
 
 ZERO_TARGETS: Settings = [
     (OBJECTS["target_velocity"], 0),
@@ -32,47 +29,6 @@ ZERO_TARGETS: Settings = [
     (OBJECTS["current_mode_setting_value"], 0),
 ]
 """A drive keeps its last target over a restart of its master, and would follow it when it is enabled."""
-
-
-def pdo_plan(config: DriveConfig) -> Settings:
-    """COB-IDs, transmission types and mappings; unused PDOs too, because at factory settings all belong to node 1."""
-    node, rpdo1_map = config.node, RPDO1_MAPS[DRIVING_MODES[config.mode]]
-    return [
-        *rpdo_settings(OBJECTS, 1, node, ON_SYNC, rpdo1_map),
-        *rpdo_settings(OBJECTS, 2, node, AT_ONCE),
-        *rpdo_settings(OBJECTS, 3, node, AT_ONCE),
-        *tpdo_settings(OBJECTS, 1, node, ON_SYNC, TPDO1_MAP),
-        *tpdo_settings(OBJECTS, 2, node, AT_ONCE),
-        *tpdo_settings(OBJECTS, 3, node, AT_ONCE),
-    ]
-
-
-def parameter_plan(config: DriveConfig) -> Settings:
-    """Limits, ramps and motor data of the profile in the drive's units."""
-    units = WheelUnits.of(config)
-    top_rpm = math.ceil(config.max_speed_m_s * abs(units.rpm_per_m_s))
-    ramp_rpm_s = units.ramp_rpm_s(config.acceleration_m_s2)
-    by_name = {
-        "profile_acceleration": ramp_rpm_s,
-        "profile_deceleration": ramp_rpm_s,
-        "quick_stop_deceleration": units.ramp_rpm_s(config.quick_stop_m_s2),
-        "max_profile_velocity": top_rpm,
-        "max_following_error": config.max_following_error_qc,
-        "continuous_current_limit": round(1e3 * config.continuous_current_a),
-        "output_current_limit": round(1e3 * config.output_current_a),
-        "pole_pairs": config.motor.pole_pairs,
-        "max_speed_in_current_mode": round(OVERSPEED_MARGIN * top_rpm),
-        "thermal_time_constant_winding": round(10 * config.motor.thermal_time_constant_s),
-    }
-    return [(OBJECTS[name], value) for name, value in by_name.items()]
-
-
-def guarding_plan(network: Network) -> Settings:
-    """Life guarding; it begins with the first request (Firmware Specification 14.1.6, 14.1.7)."""
-    return [
-        (OBJECTS["guard_time"], network.guard_time_ms),
-        (OBJECTS["life_time_factor"], network.life_time_factor),
-    ]
 
 
 class EposSetup:
@@ -151,10 +107,22 @@ class EposSetup:
         if await self._sdo.read_int(pulses) != self._config.encoder_pulses_per_turn:
             await self._written.write([(pulses, self._config.encoder_pulses_per_turn)])
             await self._clear_errors()  # the change of a sensor parameter raises 0x7320
-        remedy = (
-            "write it, save it with 0x1010/1, and switch the drive off and on: the motor type counts from its start"
-        )
-        await self._written.expect(OBJECTS["motor_type"], MOTOR_TYPES[self._config.motor.type], remedy)
+        await self._check_start_up()
+
+    async def _check_start_up(self) -> None:
+        """What counts from the drive's start on cannot be changed here; all of it that differs is told at once."""
+        found = await self._written.differences(start_up_plan(self._config))
+        if found:
+            node = self._sdo.node
+            raise Refused(
+                f"{self._who}: {'; '.join(map(str, found))}",
+                node=node,
+                object=found[0].entry.address,
+                value=found[0].found,
+                limit=found[0].expected,
+                remedy=f"`canhelm config apply {node} --save` writes the profile's values, keeps them and restarts it; "
+                f"a replaced drive is made like the old one by `canhelm config restore DIR {node}`",
+            )
 
     async def _write_outputs(self) -> None:
         await self._outputs.set_up(self._written)

@@ -50,6 +50,7 @@ PARAMETERS = (
     "thermal_time_constant_winding",
 )
 _MOTOR_TYPES = {"brushed_dc": 1, "brushless_sine": 10, "brushless_block": 11}
+_SENSOR_TYPES = {"encoder_with_index": 1, "encoder": 2, "hall": 3}
 
 
 class Settings:
@@ -143,4 +144,5 @@ def commissioned(config: DriveConfig) -> dict[str, Value]:
         "motor_type": _MOTOR_TYPES[config.motor.type],
         "pole_pairs": config.motor.pole_pairs,
         "encoder_pulses_per_turn": config.encoder_pulses_per_turn,
+        "position_sensor_type": _SENSOR_TYPES[config.position_sensor],
     }

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from drivers.canopen.pdo import ON_SYNC, pdo_struct, rpdo_cob_id, rpdo_settings, tpdo_cob_id, tpdo_settings
 from drivers.epos.codec import RPDO1_MAPS, TPDO1, TPDO1_MAP, make_rpdo1, make_rpdo3, parse_tpdo1
-from drivers.epos.configure import pdo_plan
 from drivers.epos.objects import OBJECTS
+from drivers.epos.parameters import pdo_plan
 from vcan_tests.drivers.bench import max2d
 
 
