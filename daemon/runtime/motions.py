@@ -183,8 +183,9 @@ class DriveMove(Motion):
         self._command = command
 
     async def start(self) -> None:
-        """Command the move."""
-        await self._command()
+        """Command the move, unless it was stopped before it began."""
+        if not self.stop_reason:
+            await self._command()
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """Watch the drive: over when its target is reached, its time is out or it was stopped."""

@@ -45,7 +45,7 @@ class NetworkCommands:
         raise NodeAbsent(f"no node {node} in this profile", remedy="`canhelm status` lists the nodes")
 
     async def _nmt(self, params: Params, lease: str | None) -> dict[str, Any]:
-        if self._supervisor.anything_enabled:
+        if self._supervisor.powered:
             raise Interlock(
                 "a drive is enabled: its network state is not changed", remedy="`canhelm stop`, then disable"
             )
@@ -91,7 +91,7 @@ class NetworkCommands:
                 f"{params['object']} is in no table, so its type is unknown",
                 remedy="`canhelm object list` shows what can be written",
             )
-        if self._supervisor.anything_enabled and node in self._supervisor.devices.by_node:
+        if self._supervisor.powered and node in self._supervisor.devices.by_node:
             raise Interlock(
                 "a drive is enabled: objects are written at rest and disabled", remedy="`canhelm motor disable`"
             )

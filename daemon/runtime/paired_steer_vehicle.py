@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from canhelm.errors import DeviceFault, Interlock, Refused, UsageError
+from canhelm.errors import DeviceFault, Interlock, NotReady, Refused, UsageError
 from daemon.loops.geometry import PAIR_NAMES
 from daemon.loops.measurement import Command, Measurement
 from daemon.loops.odometry import Odometry
@@ -21,7 +21,7 @@ from daemon.loops.paired_steer_target import (
 )
 from daemon.runtime.motions import Motion
 from daemon.runtime.vehicle import Vehicle
-from drivers.contract import Brake, Drive, SteeringEncoder
+from drivers.contract import Brake, Drive, NodeState, SteeringEncoder
 from profiles.schema import PairedSteerGeometry, Profile
 
 STREAM_END_S = 2.0
@@ -182,8 +182,12 @@ class PairedSteerVehicle(Vehicle):
         self._odometry.update(measurement)
 
     def require_free(self, motion: Motion) -> None:
-        """A single wheel turns only with both steering brakes engaged; the law engages them by itself."""
+        """A single wheel turns only with both steering brakes engaged; the law engages them, and needs the headings."""
         if isinstance(motion, PairedSteerMotion):
+            for encoder in self.encoders:
+                if encoder.node_state is not NodeState.READY:
+                    remedy = "`canhelm status` shows every node"
+                    raise NotReady(encoder.status_sentence, node=encoder.node, remedy=remedy)
             return
         loose = [brake.name for brake in self.brakes if brake.state != "engaged"]
         if loose:

@@ -80,7 +80,7 @@ class Supervisor:
             return VehicleState.FAULT
         if self._halting:
             return VehicleState.STOPPING
-        if self._powered:
+        if self.powered:
             return VehicleState.ACTIVE
         states = {device.node_state for device in self.devices.by_node.values()}
         if states <= {NodeState.READY}:
@@ -94,8 +94,7 @@ class Supervisor:
             return f"emergency stop: {self._estop_reason}; reset by `canhelm reset`"
         if self._fault is not None:
             return f"{self._fault.message}; after the cause is gone: `canhelm reset`"
-        waiting = [device.status_sentence for device in self._not_ready()]
-        return "; ".join(waiting) if waiting else ""
+        return "; ".join(device.status_sentence for device in self._not_ready())
 
     @property
     def anything_enabled(self) -> bool:
@@ -130,10 +129,12 @@ class Supervisor:
 
         Raises:
             EmergencyStop, NotReady: as :meth:`require_ready`.
-            Refused: its drives are busy.
+            Refused: its drives are busy, or its lease has run out.
             Interlock: a brake stands against it.
         """
         self.require_ready(motion.drives)
+        if motion.lease is not None:
+            self.leases.client(motion.lease)
         for other in self.motions.values():
             if set(other.drives) & set(motion.drives):
                 holder = f"held by {self.leases.client(other.lease)}" if other.lease else "handed to the daemon"
@@ -323,18 +324,19 @@ class Supervisor:
 
     def _watch_devices(self, now_s: float) -> None:
         if self._fault is None and not self._estop_reason:
-            fault = self._watch.look(now_s, powered=self._powered)
+            fault = self._watch.look(now_s, powered=self.powered)
             if fault is not None:
                 self.fault(fault)
 
     def _on_node_event(self, event: NodeEvent) -> None:
         self.log.add(event.severity, event.name or f"node {event.node}", event.message, event.remedy)
         fault = self._watch.lost(event)
-        if fault is not None and self._fault is None and self._powered:
+        if fault is not None and self._fault is None and self.powered:
             self.fault(fault)
 
     @property
-    def _powered(self) -> bool:
+    def powered(self) -> bool:
+        """Whether a motion is under way, be it only preparing itself, or any drive has its power stage on."""
         return bool(self.motions) or self.anything_enabled
 
     # --- leases ------------------------------------------------------------------------------------------------
@@ -385,7 +387,7 @@ class Supervisor:
     async def close(self) -> None:
         """Bring the vehicle to rest, switch every power stage off, and end all tasks."""
         self._closing = True
-        powered = self._powered
+        powered = self.powered
         self._halt(Refused("the motion was stopped: the daemon is going down"))
         if powered:
             await self._stop_and_disable()

@@ -84,7 +84,7 @@ class Vehicle(ABC):
         """Told of every cycle's measurement (odometry)."""
 
     def require_free(self, motion: Motion) -> None:
-        """Raise Interlock where a brake stands against the motion."""
+        """Raise Interlock where a brake stands against the motion, NotReady where a device that it needs is away."""
 
     def wheel_of(self, name: str) -> tuple[int, int]:
         """Index of a drive in the order of the loops, and the number of drives."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from canhelm.errors import CanhelmError, DeviceFault, NotReady, Refused
+from canhelm.errors import CanhelmError, DeviceFault, Interlock, NotReady, Refused
 from drivers.contract import BrakeState
 from drivers.simulated.epos import SimulatedEpos
 from vcan_tests.robot import Robot, running_robot
@@ -120,3 +120,48 @@ async def test_nothing_begins_while_the_daemon_goes_down() -> None:
         with pytest.raises(NotReady, match="going down"):
             await robot.call("steer", pair="front", angle_deg=1.0)
         assert not _twin(robot, 1).motion.powered
+
+
+async def test_a_pair_is_not_steered_without_the_reading_of_its_encoder() -> None:
+    async with running_robot(powered=False, booted=False) as robot:
+        for node in (1, 2, 3, 4, 5):
+            robot.network.power_on(node)
+        await robot.until(lambda: robot.app.devices.brakes["front"].state is BrakeState.ENGAGED)
+        with pytest.raises(NotReady, match="front"):
+            await robot.call("steer", pair="front", angle_deg=10.0)
+        assert robot.network.world.heading_rad("front") == 0.0
+
+
+@pytest.mark.parametrize(
+    ("method", "params"),
+    [
+        ("sdo.write", {"node": 1, "object": "current_mode_setting_value", "value": 500}),
+        ("nmt", {"command": "reset", "node": "all"}),
+    ],
+)
+async def test_the_network_is_left_alone_while_a_motion_prepares_itself(method: str, params: dict[str, Any]) -> None:
+    async with running_robot() as robot:
+        moving = _begin(robot, "motor.current", node=1, current_ma=500.0, duration_s=0.2)
+        await asyncio.sleep(0.002)
+        with pytest.raises(Interlock):
+            await robot.app.service.call(method, params, None)
+        assert not isinstance(await moving, CanhelmError)
+
+
+async def test_a_move_whose_client_hangs_up_while_it_is_enabled_does_not_begin() -> None:
+    async with running_robot() as robot:
+        position_rad = robot.network.world.axes["rear_right"].position_rad
+        moving = _begin(robot, "motor.position", node=1, position_qc=20_000, relative=True, velocity_rpm=500.0)
+        await asyncio.sleep(0.01)
+        assert robot.lease is not None
+        robot.app.service.close_lease(robot.lease)
+        assert isinstance(await moving, Refused)
+        assert abs(robot.network.world.axes["rear_right"].position_rad - position_rad) < 0.02
+
+
+async def test_a_lease_that_has_run_out_holds_no_new_motion() -> None:
+    async with running_robot() as robot:
+        lease = robot.app.service.open_lease("test")
+        await asyncio.sleep(robot.app.service.lease_timeout_s + 0.1)
+        with pytest.raises(Refused, match="has run out"):
+            await robot.app.service.call("motor.velocity", {"node": 1, "velocity_rpm": 100.0}, lease)
