@@ -31,6 +31,8 @@ METHOD_NOT_FOUND = -32601
 INTERNAL_ERROR = -32603
 
 SYSTEM_FOLDER = Path("/run/canhelm")
+GATEWAY_SUFFIX = ".309.sock"
+"""Ending of the sockets beside them that speak CiA 309-3."""
 _ROBOT_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,63}")
 
 
@@ -164,7 +166,7 @@ def find_sockets() -> list[Path]:
 
 def _sockets_in(folder: Path) -> list[Path]:
     try:
-        return sorted(path for path in folder.iterdir() if path.suffix == ".sock")
+        return sorted(path for path in folder.glob("*.sock") if not path.name.endswith(GATEWAY_SUFFIX))
     except OSError:
         return []
 

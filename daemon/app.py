@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import signal
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,9 +24,25 @@ from drivers.simulated.network import SimulatedNetwork
 from profiles.schema import Profile
 
 if TYPE_CHECKING:
+    from daemon.api.gateway309 import Gateway309
     from daemon.api.server import Server
 
 LOGGER = logging.getLogger("canhelm")
+
+
+@dataclass(frozen=True, slots=True)
+class GatewayAccess:
+    """How other CANopen tools reach the bus through the daemon (CiA 309-3).
+
+    Attributes:
+        path: of the gateway's Unix socket.
+        tcp_port: port on the loopback interface, read-only; None for none.
+        writable: the Unix socket may write, too.
+    """
+
+    path: Path
+    tcp_port: int | None = None
+    writable: bool = False
 
 
 class App:
@@ -38,6 +55,7 @@ class App:
         record: folder or file for a candump log; None for none.
         seed: of everything random in the simulated network.
         powered: whether the simulated nodes have power from the start.
+        gateway: where other CANopen tools are served; None for nowhere.
 
     Raises:
         BusOff: from :meth:`start`, where the interface is missing or down.
@@ -52,6 +70,7 @@ class App:
         record: Path | None = None,
         seed: int = 0,
         powered: bool = True,
+        gateway: GatewayAccess | None = None,
     ) -> None:
         self.profile = profile
         self.network: SimulatedNetwork | None = None
@@ -69,6 +88,7 @@ class App:
         commands = Commands(self.supervisor, self._switch_power if self.network else None)
         self.service = Service(profile.name, self.supervisor, commands, self.bus, self.cycle)
         self.server = self._serve(socket) if socket else None
+        self.gateway = self._serve_tools(gateway) if gateway else None
 
     def _simulated_bus(self, seed: int) -> Bus:
         self.medium = SimulatedBus(bit_rate=self.profile.network.bit_rate, name="vcan0")
@@ -85,6 +105,11 @@ class App:
 
         return Server(self.service, socket)
 
+    def _serve_tools(self, access: GatewayAccess) -> Gateway309:
+        from daemon.api.gateway309 import Gateway309
+
+        return Gateway309(self.supervisor, access.path, tcp_port=access.tcp_port, writable=access.writable)
+
     def _switch_power(self, node: int | str, on: bool) -> None:
         assert self.network is not None
         if on:
@@ -96,6 +121,8 @@ class App:
         """Open the socket first, then the bus; everything else comes up by itself. Raises BusOff."""
         if self.server is not None:
             await self.server.start()
+        if self.gateway is not None:
+            await self.gateway.start()
         if self._record is not None:
             virtual = isinstance(asyncio.get_running_loop(), VirtualTimeLoop)
             self.recorder = CandumpRecorder(self.bus, self._record, self.profile.name, virtual=virtual)
@@ -108,6 +135,8 @@ class App:
 
     async def close(self) -> None:
         """Bring the vehicle to rest, then take everything down."""
+        if self.gateway is not None:
+            await self.gateway.close()
         await self.supervisor.close()
         self.cycle.stop()
         await self.devices.close()

@@ -142,14 +142,7 @@ class Server:
         await asyncio.sleep(0)
         for deaf in list(self.connections):
             deaf.abort()
-        self._remove_socket()
-
-    def _remove_socket(self) -> None:
-        try:
-            if os.stat(self.path).st_ino == self._inode:
-                os.unlink(self.path)
-        except FileNotFoundError:
-            pass
+        remove_socket(self.path, self._inode)
 
     def status(self) -> dict[str, Any]:
         """The backend's status with the server's own counters."""
@@ -179,8 +172,12 @@ class Server:
                 connection.publish(line)
 
 
-def open_listener(path: Path) -> socket.socket:
+def open_listener(path: Path, option: str = "--socket") -> socket.socket:
     """A listening socket at a path, 0660, of the group canhelm where there is one; a dead daemon's is replaced.
+
+    Args:
+        path: where.
+        option: how a person chooses another place.
 
     Raises:
         Refused: another daemon answers there.
@@ -188,17 +185,17 @@ def open_listener(path: Path) -> socket.socket:
         PermissionRefused: this user may not create it.
     """
     try:
-        _own_folder(path.parent)
-        _clear_stale(path)
+        _own_folder(path.parent, option)
+        _clear_stale(path, option)
         listener = _bind(path)
     except PermissionError as error:
         raise PermissionRefused(
-            f"no socket can be opened at {path}: {error.strerror}", remedy="choose another place with --socket PATH"
+            f"no socket can be opened at {path}: {error.strerror}", remedy=f"choose another place with {option} PATH"
         ) from None
     except OSError as error:
         raise ConfigError(
             f"no socket can be opened at {path}: {error.strerror or error}",
-            remedy="choose another place with --socket PATH (at most 107 characters)",
+            remedy=f"choose another place with {option} PATH (at most 107 characters)",
         ) from None
     _give_to_group(path)
     return listener
@@ -217,24 +214,33 @@ def _bind(path: Path) -> socket.socket:
     return listener
 
 
-def _own_folder(folder: Path) -> None:
+def remove_socket(path: Path, inode: int) -> None:
+    """Take a socket away, unless another one has taken its place since."""
+    try:
+        if os.stat(path).st_ino == inode:
+            os.unlink(path)
+    except FileNotFoundError:
+        pass
+
+
+def _own_folder(folder: Path, option: str) -> None:
     """Make the folder; a shared place such as /tmp must not hold one that somebody else has put there."""
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     if folder == protocol.user_folder():
         found = os.lstat(folder)
         if found.st_uid != os.getuid() or not stat.S_ISDIR(found.st_mode):
-            raise PermissionRefused(f"{folder} belongs to somebody else", remedy="choose a place with --socket PATH")
+            raise PermissionRefused(f"{folder} belongs to somebody else", remedy=f"choose a place with {option} PATH")
 
 
-def _clear_stale(path: Path) -> None:
+def _clear_stale(path: Path, option: str) -> None:
     try:
         mode = os.lstat(path).st_mode
     except FileNotFoundError:
         return
     if not stat.S_ISSOCK(mode):
-        raise ConfigError(f"{path} is there and is no socket", remedy="choose another place with --socket PATH")
+        raise ConfigError(f"{path} is there and is no socket", remedy=f"choose another place with {option} PATH")
     if protocol.is_live(path):
-        raise Refused(f"a daemon already answers on {path}", remedy="stop it first, or give this one --socket PATH")
+        raise Refused(f"a daemon already answers on {path}", remedy=f"stop it first, or give this one {option} PATH")
     os.unlink(path)
 
 

@@ -24,6 +24,9 @@ def run(
     socket: Path | None = None,
     record: Path | None = None,
     unpowered: Annotated[bool, Parameter(negative=())] = False,
+    gateway: Path | None = None,
+    gateway_tcp: int | None = None,
+    gateway_write: Annotated[bool, Parameter(negative=())] = False,
 ) -> int:
     """Run a robot's daemon in the foreground until Ctrl-C or SIGTERM; then it stops the vehicle and goes down.
 
@@ -38,8 +41,11 @@ def run(
         socket: Where to listen; the default is the robot's socket in the runtime folder.
         record: Folder or file for a candump log.
         unpowered: Simulated drives have no power until `canhelm sim power all on`.
+        gateway: Where other CANopen tools connect (CiA 309-3); the default is beside the socket, as NAME.309.sock.
+        gateway_tcp: Port on the loopback interface for such tools as well, to read only.
+        gateway_write: Let them write objects and command network states through the gateway's socket, too.
     """
-    from daemon.app import App
+    from daemon.app import App, GatewayAccess
     from profiles.loader import load
 
     chosen = _bus(bus, simulate=simulate)
@@ -56,9 +62,18 @@ def run(
     path = socket or Path(protocol.default_socket(loaded.profile.name))
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s %(message)s")
     logging.getLogger("canhelm").info("robot %s on %s, socket %s", loaded.profile.name, chosen, path)
+    access = GatewayAccess(gateway or path.with_suffix(protocol.GATEWAY_SUFFIX), gateway_tcp, gateway_write)
 
     async def serve() -> None:
-        app = App(loaded.profile, chosen, socket=path, record=record, seed=seed, powered=not unpowered)
+        app = App(
+            loaded.profile,
+            chosen,
+            socket=path,
+            record=record,
+            seed=seed,
+            powered=not unpowered,
+            gateway=access,
+        )
         await app.run()
 
     asyncio.run(serve())

@@ -1,0 +1,51 @@
+"""What nobody may do to the nodes of the vehicle through the bus, past the supervisor.
+
+The drives are commanded by the control cycle and guarded by good cycles; a person or a tool that reads and writes
+objects must neither disturb a drive that is enabled nor switch one on behind the supervisor's back.
+"""
+
+from __future__ import annotations
+
+from canhelm.errors import Interlock
+from daemon.runtime.supervisor import Supervisor
+
+CONTROLWORD = 0x6040
+ENABLE_OPERATION = 0x000F
+"""Controlword bits that switch the power stage on (CiA 402, device control)."""
+LIFE_GUARDING = (0x100C, 0x100D)
+BRAKE_OUTPUTS = (0x2078, 0x2079)
+
+
+def require_all_disabled(supervisor: Supervisor) -> None:
+    """Raise Interlock while any drive has power: neither network states nor objects are changed then."""
+    if supervisor.powered:
+        raise Interlock(
+            "a drive is enabled: network states and objects are changed at rest, with every drive disabled",
+            remedy="`canhelm stop`, then `canhelm motor disable`",
+        )
+
+
+def require_write_allowed(supervisor: Supervisor, node: int, index: int, value: int) -> None:
+    """Raise Interlock where writing an object would get round an interlock.
+
+    Args:
+        node: its node; nodes that are no part of the vehicle are free.
+        index: the object.
+        value: what would be written, as an unsigned number.
+    """
+    device = supervisor.devices.by_node.get(node)
+    if device is None:
+        return
+    require_all_disabled(supervisor)
+    drive = device.name if device.name in supervisor.devices.drives else ""
+    if drive and index == CONTROLWORD and value & ENABLE_OPERATION == ENABLE_OPERATION:
+        _refuse(device.who, "is enabled by the daemon alone, under a lease", f"`canhelm motor enable {drive}`")
+    if index in LIFE_GUARDING:
+        _refuse(device.who, "is guarded as its profile says", "change `network` in the profile")
+    brakes = [brake.name for brake in supervisor.devices.brakes.values() if brake.drive == drive]
+    if brakes and index in BRAKE_OUTPUTS:
+        _refuse(device.who, f"works the {brakes[0]} brake with its outputs", f"`canhelm brake release {brakes[0]}`")
+
+
+def _refuse(who: str, why: str, remedy: str) -> None:
+    raise Interlock(f"{who} {why}: this object is not written from outside", remedy=remedy)
