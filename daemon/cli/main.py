@@ -45,14 +45,23 @@ COMMANDS: dict[Group, dict[str, str]] = {
         "doctor": "daemon.cli.doctor:doctor",
         "explain": "daemon.cli.explain:explain",
     },
-    NETWORK: {"nmt": "daemon.cli.nmt:app", "sdo": "daemon.cli.sdo:app", "object": "daemon.cli.object:app"},
+    NETWORK: {
+        "nmt": "daemon.cli.nmt:app",
+        "sdo": "daemon.cli.sdo:app",
+        "config": "daemon.cli.config:app",
+        "object": "daemon.cli.object:app",
+    },
     SETUP: {
         "run": "daemon.cli.run:run",
         "profile": "daemon.cli.profile:app",
         "version": "daemon.cli.version:version",
         "completion": "daemon.cli.completion:completion",
     },
-    EXPERIMENTS: {"demo": "daemon.cli.demo:demo", "sim": "daemon.cli.sim:app"},
+    EXPERIMENTS: {
+        "demo": "daemon.cli.demo:demo",
+        "simulate": "daemon.cli.simulate:simulate",
+        "sim": "daemon.cli.sim:app",
+    },
 }
 """Commands by group, in the order of the help; module and function (or a noun's own app) of each."""
 
