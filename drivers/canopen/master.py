@@ -18,6 +18,8 @@ from drivers.canopen.nmt import NMT_COB_ID, SYNC_COB_ID, make_nmt
 from drivers.canopen.sdo import ANSWER_COB_ID, SdoClient
 from profiles.schema import Network
 
+SEGMENT_BITS = 300
+"""Time for each segment of a block transfer, in bit times: a frame of 8 bytes, and as long again for others."""
 SCAN_AT_ONCE = 16
 """Nodes that a scan asks at the same time, so that it does not fill the transmit queue."""
 
@@ -112,7 +114,8 @@ class Master:
         client = self._clients.get(node)
         if client is None:
             name, timeout_s = self.names.get(node, ""), self.network.sdo_timeout_s
-            client = self._clients[node] = SdoClient(node, name, self.bus.send, timeout_s, self.counters)
+            client = SdoClient(node, name, self.bus.send, timeout_s, self.counters, SEGMENT_BITS / self.bus.bit_rate)
+            self._clients[node] = client
             self.subscribe(ANSWER_COB_ID + node, client.receive)
         return client
 

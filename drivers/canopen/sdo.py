@@ -1,111 +1,50 @@
-"""SDO client (CiA 301 7.2.4): expedited and segmented transfers, one queue a node."""
+"""SDO client (CiA 301 7.2.4): expedited, segmented and block transfers, one queue a node."""
 
 from __future__ import annotations
 
 import asyncio
 import struct
-from collections.abc import Callable
-from enum import IntEnum
-from typing import NamedTuple
+from collections.abc import Awaitable, Callable
 
 from canhelm.errors import Aborted, CanhelmError, DeviceFault, NodeAbsent, Timeout, UsageError
 from drivers.canopen.codes import SDO_ABORTS
 from drivers.canopen.counters import CanopenCounters
 from drivers.canopen.objects import ObjectDef
+from drivers.canopen.sdo_block import (
+    BLOCK_FROM_BYTES,
+    BlockBroken,
+    BlockChannel,
+    BlockRefused,
+    NodeWentAway,
+    SegmentedInstead,
+    download,
+    upload,
+)
+from drivers.canopen.sdo_frames import (
+    MAX_UPLOAD_BYTES,
+    Address,
+    AnswerKind,
+    SdoAnswer,
+    make_abort,
+    make_download,
+    make_download_segment,
+    make_upload,
+    make_upload_segment,
+    parse_answer,
+)
 
 REQUEST_COB_ID = 0x600
 ANSWER_COB_ID = 0x580
 ABORT_TIMEOUT = 0x0504_0000
+ABORT_UNKNOWN_COMMAND = 0x0504_0001
 ABORT_OUT_OF_MEMORY = 0x0504_0005
-MAX_UPLOAD_BYTES = 65536
-"""A node that sends more than this in one transfer is stopped."""
+ABORT_GENERAL = 0x0800_0000
+NO_ANSWER_REMEDY = "check its power, its node id and the CAN cable"
 
-_INITIATE = struct.Struct("<BHB4s")
-_ABORT = struct.Struct("<BHBI")
-
-Address = tuple[int, int]
 SdoObject = ObjectDef | Address
 """An object of a table, or index and sub-index of any other, whose value is then plain bytes."""
 
-
-class AnswerKind(IntEnum):
-    """What a server answers: the command specifier, top three bits of byte 0."""
-
-    UPLOAD_SEGMENT = 0
-    DOWNLOAD_SEGMENT = 1
-    UPLOAD = 2
-    DOWNLOAD = 3
-    ABORT = 4
-
-
 _SEGMENTS = (AnswerKind.UPLOAD_SEGMENT, AnswerKind.DOWNLOAD_SEGMENT)
-
-
-class SdoAnswer(NamedTuple):
-    """One answer of an SDO server.
-
-    Attributes:
-        address: index and sub-index; ``(0, 0)`` for segments, which carry none.
-        toggle: toggle bit of a segment.
-        data: value or segment.
-        last: nothing follows: an expedited upload or a last segment.
-        sized: the length of an expedited value was given.
-        code: abort code.
-    """
-
-    kind: AnswerKind
-    address: Address = (0, 0)
-    toggle: int = 0
-    data: bytes = b""
-    last: bool = False
-    sized: bool = True
-    code: int = 0
-
-
-def make_upload(index: int, sub: int) -> bytes:
-    """Request to read an object."""
-    return _INITIATE.pack(0x40, index, sub, b"")
-
-
-def make_download(index: int, sub: int, data: bytes) -> bytes:
-    """Request to write an object: the value itself up to 4 bytes, else the length of what follows in segments."""
-    if 1 <= len(data) <= 4:
-        return _INITIATE.pack(0x23 | (4 - len(data)) << 2, index, sub, data)
-    return _INITIATE.pack(0x21, index, sub, len(data).to_bytes(4, "little"))
-
-
-def make_upload_segment(toggle: int) -> bytes:
-    """Request for the next segment of a read."""
-    return bytes((0x60 | toggle << 4, 0, 0, 0, 0, 0, 0, 0))
-
-
-def make_download_segment(chunk: bytes, toggle: int, last: bool) -> bytes:
-    """Next segment of a write, 0 to 7 bytes."""
-    return bytes((toggle << 4 | (7 - len(chunk)) << 1 | last,)) + chunk.ljust(7, b"\0")
-
-
-def make_abort(index: int, sub: int, code: int) -> bytes:
-    """The client gives a transfer up."""
-    return _ABORT.pack(0x80, index, sub, code)
-
-
-def parse_answer(data: bytes) -> SdoAnswer | None:
-    """The answer in 8 bytes from an SDO server, or None where it is none."""
-    if len(data) != 8 or data[0] >> 5 > AnswerKind.ABORT:
-        return None
-    kind, toggle = AnswerKind(data[0] >> 5), data[0] >> 4 & 1
-    if kind is AnswerKind.UPLOAD_SEGMENT:
-        return SdoAnswer(kind, toggle=toggle, data=data[1 : 8 - (data[0] >> 1 & 7)], last=bool(data[0] & 1))
-    if kind is AnswerKind.DOWNLOAD_SEGMENT:
-        return SdoAnswer(kind, toggle=toggle)
-    command, index, sub, code = _ABORT.unpack(data)
-    if kind is AnswerKind.ABORT:
-        return SdoAnswer(kind, (index, sub), code=code)
-    if kind is AnswerKind.DOWNLOAD:
-        return SdoAnswer(kind, (index, sub))
-    expedited, sized = bool(command & 2), bool(command & 1)
-    value = data[4 : 8 - (command >> 2 & 3)] if expedited and sized else data[4:]
-    return SdoAnswer(kind, (index, sub), data=value, last=expedited, sized=sized)
 
 
 def _address(obj: SdoObject) -> Address:
@@ -134,6 +73,10 @@ class SdoClient:
         send: puts a frame on the bus: COB-ID, data, deadline.
         timeout_s: how long an answer may take.
         counters: where dropped answers are counted.
+        segment_s: time to leave for each segment of a block.
+
+    Attributes:
+        blocks: whether long values go in blocks; ended by a server that does not know block transfer.
     """
 
     def __init__(
@@ -143,12 +86,16 @@ class SdoClient:
         send: Callable[[int, bytes, float], None],
         timeout_s: float,
         counters: CanopenCounters,
+        segment_s: float = 0.001,
     ) -> None:
         self.node = node
         self.name = name
         self._send = send
         self._timeout_s = timeout_s
         self._counters = counters
+        self._segment_s = segment_s
+        self.blocks = True
+        self._channel: BlockChannel | None = None
         self._turn = asyncio.Lock()
         self._object: SdoObject = (0, 0)
         self._expected = (AnswerKind.ABORT, 0)
@@ -216,6 +163,8 @@ class SdoClient:
             if answer.last:
                 size = obj.type.bits // 8 if isinstance(obj, ObjectDef) else 0
                 return answer.data[: size or 4] if not answer.sized else answer.data
+            if self.blocks and answer.sized and int.from_bytes(answer.data, "little") >= BLOCK_FROM_BYTES:
+                return await self._upload_blocks(timeout)
             return await self._upload_segments(timeout)
 
     async def write_raw(self, obj: SdoObject, data: bytes, timeout_s: float | None = None) -> None:
@@ -223,6 +172,8 @@ class SdoClient:
         async with self._turn:
             self._object = obj
             timeout = timeout_s or self._timeout_s
+            if self.blocks and len(data) >= BLOCK_FROM_BYTES and await self._download_blocks(data, timeout):
+                return
             await self._exchange(make_download(*_address(obj), data), AnswerKind.DOWNLOAD, 0, timeout)
             if not 1 <= len(data) <= 4:
                 await self._download_segments(data, timeout)
@@ -245,6 +196,58 @@ class SdoClient:
             request = make_download_segment(data[start : start + 7], toggle, start + 7 >= len(data))
             await self._segment(request, AnswerKind.DOWNLOAD_SEGMENT, toggle, timeout_s)
             toggle ^= 1
+
+    async def _upload_blocks(self, timeout_s: float) -> bytes:
+        """Begin anew in blocks, now that the value is known to be long; in segments where the server cannot."""
+        self._abort(ABORT_GENERAL)
+        try:
+            value = await self._in_blocks(upload, timeout_s)
+        except SegmentedInstead:
+            self.blocks = False
+            return await self._upload_segments(timeout_s)
+        if value is None:
+            await self._exchange(make_upload(*_address(self._object)), AnswerKind.UPLOAD, 0, timeout_s)
+            return await self._upload_segments(timeout_s)
+        return value
+
+    async def _download_blocks(self, data: bytes, timeout_s: float) -> bool:
+        """Write in blocks; False where the server does not know block transfer."""
+
+        async def transfer(channel: BlockChannel) -> bytes:
+            await download(channel, data, self._segment_s)
+            return data
+
+        return await self._in_blocks(transfer, timeout_s) is not None
+
+    async def _in_blocks(self, transfer: Callable[[BlockChannel], Awaitable[bytes]], timeout_s: float) -> bytes | None:
+        """Carry out a block transfer; None where the server does not know them."""
+        channel = self._channel = BlockChannel(self._request, _address(self._object), timeout_s)
+        try:
+            return await transfer(channel)
+        except BlockRefused as refusal:
+            if refusal.code != ABORT_UNKNOWN_COMMAND or channel.begun:
+                raise self._aborted(refusal.code) from None
+            self.blocks = False
+            return None
+        except BlockBroken as broken:
+            self._abort(broken.code)
+            raise self._error(DeviceFault, str(broken), "try again; look for a second SDO client") from None
+        except NodeWentAway as gone:
+            raise self._error(NodeAbsent, str(gone), NO_ANSWER_REMEDY) from None
+        except TimeoutError:
+            self._abort(ABORT_TIMEOUT)
+            raise self._block_timeout(channel, timeout_s) from None
+        except asyncio.CancelledError:
+            self._abort(ABORT_TIMEOUT)
+            raise
+        finally:
+            self._counters.late_answers += channel.stray
+            self._channel = None
+
+    def _block_timeout(self, channel: BlockChannel, timeout_s: float) -> CanhelmError:
+        if channel.begun:
+            return self._error(Timeout, "stopped answering in the middle of a transfer", "try again")
+        return self._error(NodeAbsent, f"did not answer within {timeout_s * 1e3:.0f} ms", NO_ANSWER_REMEDY)
 
     async def _segment(self, request: bytes, kind: AnswerKind, toggle: int, timeout_s: float) -> SdoAnswer:
         try:
@@ -273,6 +276,9 @@ class SdoClient:
 
     def receive(self, can_id: int, data: bytes, timestamp: float) -> None:
         """Take a frame from the node's answer COB-ID."""
+        if self._channel is not None:
+            self._channel.put(data)
+            return
         answer = parse_answer(data)
         if answer is None:
             self._counters.malformed += 1
@@ -293,15 +299,18 @@ class SdoClient:
         """End the transfer that is running: the node has restarted and will not answer it."""
         if self._waiter is not None:
             self._fail(self._waiter, reason)
+        if self._channel is not None:
+            self._channel.end(reason)
 
     def _fail(self, waiter: asyncio.Future[SdoAnswer], reason: str) -> None:
         if not waiter.done():
-            remedy = "check its power, its node id and the CAN cable"
-            waiter.set_exception(self._error(NodeAbsent, reason, remedy))
+            waiter.set_exception(self._error(NodeAbsent, reason, NO_ANSWER_REMEDY))
 
     def _abort(self, code: int) -> None:
-        deadline = asyncio.get_running_loop().time() + self._timeout_s
-        self._send(REQUEST_COB_ID + self.node, make_abort(*_address(self._object), code), deadline)
+        self._request(make_abort(*_address(self._object), code))
+
+    def _request(self, data: bytes) -> None:
+        self._send(REQUEST_COB_ID + self.node, data, asyncio.get_running_loop().time() + self._timeout_s)
 
     @property
     def _who(self) -> str:

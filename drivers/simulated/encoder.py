@@ -108,6 +108,7 @@ class SimulatedEncoder(SimulatedNode):
             transmit_pdos=2,
             boot_delay_s=boot_delay_s,
             transmit_types=_TYPES,
+            block_transfer=True,
         )
         self._describe_position()
 

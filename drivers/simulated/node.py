@@ -16,6 +16,7 @@ from drivers.simulated.bus import SimulatedPort
 from drivers.simulated.dictionary import CANNOT_STORE, LOAD, OUT_OF_RANGE, SAVE, SdoAbort, SimulatedDictionary
 from drivers.simulated.guarding import GuardedSide
 from drivers.simulated.pdo import Pdo, ReceivePdo, TransmitPdo
+from drivers.simulated.sdo_block_server import BlockServer
 from drivers.simulated.sdo_server import SdoServer
 
 _NMT, _SYNC, _EMCY, _SDO_ANSWER, _SDO_REQUEST, _GUARDING = 0x000, 0x080, 0x080, 0x580, 0x600, 0x700
@@ -55,6 +56,7 @@ class SimulatedNode:
         receive_pdos, transmit_pdos: how many it has.
         boot_delay_s: time from power-up or reset to the boot-up message.
         transmit_types: transmission types of its TPDOs.
+        block_transfer: whether its SDO server knows block transfer.
 
     Attributes:
         nmt_state: BOOT_UP while it is off or starts.
@@ -71,6 +73,7 @@ class SimulatedNode:
         transmit_pdos: int,
         boot_delay_s: float,
         transmit_types: frozenset[int] = frozenset((1, 255)),
+        block_transfer: bool = False,
     ) -> None:
         self.port = port
         self.node_id = node_id
@@ -82,7 +85,7 @@ class SimulatedNode:
         self.error_register = 0
         self.error_history: list[int] = []
         self._history_length = sum(index == 0x1003 and sub > 0 for index, sub in dictionary.objects)
-        self._sdo = SdoServer(dictionary)
+        self._sdo = SdoServer(dictionary, BlockServer(dictionary, self._answer_sdo) if block_transfer else None)
         numbers = range(receive_pdos)
         self._rpdos = [ReceivePdo(dictionary, 0x1400 + n, 0x1600 + n, self._may_remap) for n in numbers]
         numbers = range(transmit_pdos)
@@ -271,7 +274,10 @@ class SimulatedNode:
         self.before_access(now_s)
         answer = self._sdo.answer(data)
         if answer is not None:
-            self.port.send(_SDO_ANSWER + self.node_id, answer)
+            self._answer_sdo(answer)
+
+    def _answer_sdo(self, answer: bytes) -> None:
+        self.port.send(_SDO_ANSWER + self.node_id, answer)
 
     def _on_nmt(self, data: bytes, _: float) -> None:
         command = _COMMANDS.get(data[0]) if len(data) == 2 else None

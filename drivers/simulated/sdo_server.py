@@ -1,4 +1,4 @@
-"""The SDO server of a simulated node: expedited and segmented transfer, no block transfer (CiA 301 7.2.4)."""
+"""The SDO server of a simulated node: expedited and segmented transfer, block transfer as an option (CiA 301 7.2.4)."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import struct
 from dataclasses import dataclass
 
 from drivers.simulated.dictionary import TOO_LONG, WRONG_LENGTH, SdoAbort, SimulatedDictionary
+from drivers.simulated.sdo_block_server import BlockServer
 
 UNKNOWN_COMMAND = 0x0504_0001
 TOGGLE_NOT_ALTERNATED = 0x0503_0000
@@ -35,29 +36,39 @@ class SdoServer:
 
     Args:
         dictionary: what is read and written.
+        blocks: its block transfer; None for a node without.
     """
 
-    def __init__(self, dictionary: SimulatedDictionary) -> None:
+    def __init__(self, dictionary: SimulatedDictionary, blocks: BlockServer | None = None) -> None:
         self._dictionary = dictionary
+        self._blocks = blocks
         self._transfer: _Transfer | None = None
 
     def reset(self) -> None:
         """Forget a transfer that is under way."""
         self._transfer = None
+        if self._blocks is not None:
+            self._blocks.reset()
 
     def answer(self, request: bytes) -> bytes | None:
         """The answer to a request of 8 bytes; None where the protocol gives none (the client's abort)."""
         command, index, sub, _ = _INITIATE.unpack(request)
         service = command >> 5
-        if service == 4:
-            self._transfer = None
+        blocks = self._blocks
+        receiving = blocks is not None and blocks.receiving
+        if command == 0x80 or (service == 4 and not receiving):
+            self.reset()
             return None
         if service in (0, 3) and self._transfer is not None:
             index, sub = self._transfer.index, self._transfer.sub
+        elif blocks is not None and blocks.address is not None:
+            index, sub = blocks.address
         try:
+            if blocks is not None and (receiving or service in (5, 6)):
+                return _serve_block(blocks, request)
             return self._serve(service, request, index, sub)
         except SdoAbort as abort:
-            self._transfer = None
+            self.reset()
             return _ABORT.pack(0x80, index, sub, abort.code)
 
     def _serve(self, service: int, request: bytes, index: int, sub: int) -> bytes:
@@ -132,3 +143,12 @@ class SdoServer:
         if toggle != transfer.toggle:
             raise SdoAbort(TOGGLE_NOT_ALTERNATED)
         return transfer
+
+
+def _serve_block(blocks: BlockServer, request: bytes) -> bytes | None:
+    """A request of a block transfer: a segment, or client command 6 (download) or 5 (upload) with its sub-command."""
+    if blocks.receiving:
+        return blocks.take_segment(request)
+    if request[0] >> 5 == 6:
+        return blocks.end_download(request) if request[0] & 1 else blocks.begin_download(request)
+    return blocks.continue_upload(request) if request[0] & 3 else blocks.begin_upload(request)

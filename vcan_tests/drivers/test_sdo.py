@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from canhelm.errors import Aborted, DeviceFault, NodeAbsent, Timeout, UsageError
 from drivers.canopen.counters import CanopenCounters
-from drivers.canopen.sdo import (
+from drivers.canopen.sdo import SdoClient
+from drivers.canopen.sdo_frames import (
     AnswerKind,
-    SdoClient,
     make_abort,
     make_download,
     make_download_segment,
