@@ -41,6 +41,8 @@ class Opcode(IntEnum):
 
 UNANSWERED = frozenset((Opcode.SEND_NMT, Opcode.SEND_CAN_FRAME))
 """Commands that end with the end acknowledge: no answer frame follows."""
+READS = frozenset((Opcode.READ_OBJECT, Opcode.INITIATE_SEGMENTED_READ))
+"""Commands that may be carried out twice; a segment may not, because its toggle bit has moved on."""
 
 
 class Frame(NamedTuple):

@@ -1,109 +1,155 @@
-"""A host on the serial line of a simulated EPOS that knows the handshake and nothing else."""
+"""A small drive at the far end of a serial line, and a line that loses, flips, doubles and delays bytes."""
 
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
+from random import Random
 
-from drivers.epos.serial_answers import Answer, parse_answer
-from drivers.epos.serial_frames import FAILED, OKAY, UNANSWERED, Frame, frame_size, parse_frame
-from drivers.simulated.bus import SimulatedBus
-from drivers.simulated.network import SimulatedNetwork
-from drivers.simulated.serial import EposTiming, SimulatedSerial
-from drivers.simulated.serial_wire import QUIET, SerialNoise
-from profiles.loader import load
-from vcan_tests.drivers.epos_bench import RawMaster
+from drivers.epos.serial_answers import make_can_frame_answer, make_done_answer, make_read_answer
+from drivers.epos.serial_frames import (
+    UNANSWERED,
+    Frame,
+    ReadObject,
+    RequestCanFrame,
+    WriteObject,
+    frame_size,
+    parse_frame,
+    parse_request,
+)
 
-PROFILE = load("max2d").profile
-BOOTED_S = 0.2
-USUAL = EposTiming()
-OK, FAIL = bytes((OKAY,)), bytes((FAILED,))
-
-
-class Silence(Exception):
-    """The drive says nothing."""
+OPCODES = (0x0E, 0x10, 0x11, 0x12, 0x13, 0x14, 0x15, 0x20, 0x21)
+DEAD_NODE = 99
+PATIENCE_S = 0.5
 
 
-class SerialBench:
-    """The network of the MAX2D with a host on the serial line of node 1.
+class Wire:
+    """One direction: bytes in their order and at their times, each with its own bad luck."""
 
-    Attributes:
-        bus: a participant that hears all frames on the CAN bus.
-        heard: bytes that the host has got and not taken yet.
-        last_s: time at which the last byte came.
+    def __init__(self, baud: int, deliver: Callable[[bytes, float], None], share: float, dice: Random) -> None:
+        self._byte_s, self._deliver, self._share, self._dice = 10 / baud, deliver, share, dice
+        self._free_s = 0.0
+        self.spoiled = 0
+
+    def send(self, data: bytes) -> None:
+        for byte in data:
+            self._send_byte(byte)
+
+    def _send_byte(self, byte: int) -> None:
+        loop, dice = asyncio.get_running_loop(), self._dice
+        self._free_s = max(self._free_s, loop.time()) + self._byte_s
+        copies = 1
+        if dice.random() < self._share:
+            self.spoiled += 1
+            fate = dice.randrange(4)
+            copies = (0, 1, 2, 1)[fate]
+            byte ^= 1 << dice.randrange(8) if fate == 1 else 0
+            self._free_s += dice.uniform(0, 0.3) if fate == 3 else 0.0
+        for copy in range(copies):
+            self._free_s += copy * self._byte_s
+            loop.call_at(self._free_s, self._deliver, bytes((byte,)), self._free_s)
+
+
+class Drive:
+    """Keeps the drive's manners: acknowledges, patience, CRC; every object has a value of its own until it is written.
+
+    Args:
+        frame_timeout_s: time after which it gives up half a request; None for a drive that never does.
     """
 
     def __init__(
-        self, baud: int = 115200, timing: EposTiming = USUAL, noise: SerialNoise = QUIET, seed: int = 1
+        self, baud: int = 115200, share: float = 0.0, seed: int = 0, frame_timeout_s: float | None = PATIENCE_S
     ) -> None:
-        medium = SimulatedBus()
-        self.network = SimulatedNetwork(PROFILE, medium, seed=1)
-        self.bus = RawMaster(medium)
-        self.node = self.network.node(1)
-        self.serial = SimulatedSerial(self.node, baud, timing, noise, seed)
-        self.serial.cable.host = self._hear
-        self.heard = bytearray()
-        self.last_s = 0.0
-        self._more = asyncio.Event()
-
-    @classmethod
-    async def booted(
-        cls, baud: int = 115200, timing: EposTiming = USUAL, noise: SerialNoise = QUIET, seed: int = 1
-    ) -> SerialBench:
-        """A bench whose network has power and has booted."""
-        bench = cls(baud, timing, noise, seed)
-        bench.network.power_on()
-        await asyncio.sleep(BOOTED_S)
-        bench.bus.heard.clear()
-        return bench
-
-    def _hear(self, data: bytes, end_s: float) -> None:
-        self.heard += data
-        self.last_s = end_s
-        self._more.set()
+        dice = Random(seed)
+        self.host: Callable[[bytes, float], None] | None = None
+        self.to_host = Wire(baud, self._to_host, share, dice)
+        self.to_drive = Wire(baud, lambda data, _: self.take(data[0]), share, dice)
+        self.answering_s = 0.001
+        self.objects: dict[tuple[int, int, int], bytes] = {}
+        self.carried_out: list[object] = []
+        self.say = self.to_host.send
+        self.mute = False
+        self._frame_timeout_s = frame_timeout_s
+        self._expect: Callable[[int], None] = self._take_opcode
+        self._received = bytearray()
+        self._answer = b""
+        self._timer: asyncio.TimerHandle | None = None
 
     def write(self, data: bytes) -> None:
-        """Write bytes without waiting for anything."""
-        self.serial.cable.write(data)
+        """The host sends."""
+        self.to_drive.send(data)
 
-    async def take(self, count: int, limit_s: float = 1.0) -> bytes:
-        """The next ``count`` bytes. Raises Silence where they do not come."""
-        while len(self.heard) < count:
-            self._more.clear()
-            try:
-                await asyncio.wait_for(self._more.wait(), limit_s)
-            except TimeoutError:
-                raise Silence(bytes(self.heard).hex()) from None
-        taken = bytes(self.heard[:count])
-        del self.heard[:count]
-        return taken
+    def _to_host(self, data: bytes, stamp_s: float) -> None:
+        if self.host is not None and not self.mute:
+            self.host(data, stamp_s)
 
-    async def request(self, frame: bytes) -> bytes:
-        """Send a request; the acknowledges of operation code and frame."""
-        self.write(frame[:1])
-        ready = await self.take(1)
-        if ready == FAIL:
-            return ready
-        self.write(frame[1:])
-        return ready + await self.take(1)
+    def value(self, node: int, index: int, sub: int) -> bytes:
+        fresh = Random(node << 24 | index << 8 | sub).randbytes(4)
+        return self.objects.get((node, index, sub), fresh)
 
-    async def exchange(self, frame: bytes) -> bytes:
-        """Send a request that must go well; the bytes of the answer, nothing for a request without one."""
-        assert await self.request(frame) == OK + OK
-        if frame[0] in UNANSWERED:
-            return b""
-        assert await self.take(1) == b"\0"
-        self.write(OK)
-        length = await self.take(1)
-        rest = await self.take(frame_size(length[0]) - 2)
-        self.write(OK)
-        await asyncio.sleep(0.001)
-        return b"\0" + length + rest
+    def take(self, byte: int) -> None:
+        """One byte has arrived."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        self._expect(byte)
 
-    async def ask(self, frame: bytes) -> Answer:
-        """Send a request that must go well; what its answer says."""
-        raw = await self.exchange(frame)
-        checked = parse_frame(raw)
-        assert isinstance(checked, Frame)
-        answer = parse_answer(frame, checked)
-        assert isinstance(answer, Answer)
-        return answer
+    def _await(self, expect: Callable[[int], None], patience_s: float | None) -> None:
+        self._expect = expect
+        if patience_s is not None:
+            self._timer = asyncio.get_running_loop().call_later(patience_s, self._await, self._take_opcode, None)
+
+    def _take_opcode(self, byte: int) -> None:
+        if byte not in OPCODES:
+            self.say(b"F")
+            return
+        self._received = bytearray((byte,))
+        self._await(self._take_rest, self._frame_timeout_s)
+        self.say(b"O")
+
+    def _take_rest(self, byte: int) -> None:
+        self._received.append(byte)
+        if len(self._received) < frame_size(self._received[1]):
+            self._await(self._take_rest, self._frame_timeout_s)
+            return
+        frame = parse_frame(bytes(self._received))
+        self._await(self._take_opcode, None)
+        self.say(b"F" if isinstance(frame, str) else b"O")
+        if not isinstance(frame, str):
+            self._carry_out(frame)
+
+    def _carry_out(self, frame: Frame) -> None:
+        request = parse_request(frame)
+        self.carried_out.append(request)
+        if frame.opcode in UNANSWERED:
+            return
+        delay_s = 0.5 if getattr(request, "node", 0) == DEAD_NODE else self.answering_s
+        self._answer = self._answer_to(request)
+        self._expect = lambda byte: None
+        asyncio.get_running_loop().call_later(delay_s, self._begin_answer)
+
+    def _answer_to(self, request: object) -> bytes:
+        if getattr(request, "node", 0) == DEAD_NODE:
+            return make_done_answer(0x0504_0000)
+        if isinstance(request, WriteObject):
+            self.objects[request.node, request.index, request.sub] = request.data
+            return make_done_answer()
+        if isinstance(request, ReadObject):
+            return make_read_answer(self.value(request.node, request.index, request.sub))
+        if isinstance(request, RequestCanFrame):
+            return make_can_frame_answer(bytes(request.length))
+        return make_done_answer(0x0F00_FFBF)
+
+    def _begin_answer(self) -> None:
+        self._await(self._take_ready, PATIENCE_S)
+        self.say(self._answer[:1])
+
+    def _take_ready(self, byte: int) -> None:
+        if byte != ord("O"):
+            self._await(self._take_opcode, None)
+            return
+        self._await(self._take_end, PATIENCE_S)
+        self.say(self._answer[1:])
+
+    def _take_end(self, byte: int) -> None:
+        self._await(self._take_opcode, None)

@@ -1,0 +1,119 @@
+"""A serial device on the running loop: raw bytes through a file descriptor, without a thread."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import os
+import termios
+import tty
+from collections.abc import Callable
+
+from canhelm.errors import BusOff, UsageError
+
+BAUD_RATES = {rate: getattr(termios, f"B{rate}") for rate in (9600, 19200, 38400, 57600, 115200)}
+"""Rates of object 0x2002 that a terminal has, too; 14400 bit/s it has not."""
+_READ_SIZE = 4096
+_IFLAG, _CFLAG, _ISPEED, _OSPEED = 0, 2, 4, 5
+
+
+class SerialTty:
+    """One terminal device or pseudo terminal.
+
+    Args:
+        device: its path.
+        baud: bit/s.
+
+    Attributes:
+        host: takes what comes and the loop time at which it did.
+        on_lost: called once, with the reason, when the device vanishes.
+    """
+
+    def __init__(self, device: str, baud: int) -> None:
+        if baud not in BAUD_RATES:
+            known = ", ".join(str(rate) for rate in BAUD_RATES)
+            raise UsageError(f"a serial line has no {baud} bit/s", value=baud, remedy=f"give one of {known}")
+        self.device = device
+        self.baud = baud
+        self.host: Callable[[bytes, float], None] | None = None
+        self.on_lost: Callable[[str], None] | None = None
+        self._fd = -1
+        self._unsent = b""
+
+    def open(self) -> None:
+        """Open the device on the running loop: 8N1, raw, no flow control; what it had received is thrown away.
+
+        Raises:
+            BusOff: there is no such device, it is no terminal, or this user may not open it.
+        """
+        self._loop = asyncio.get_running_loop()
+        try:
+            self._fd = os.open(self.device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK | os.O_CLOEXEC)
+            self._set_up()
+        except (OSError, termios.error) as error:
+            self.close()
+            raise BusOff(
+                f"cannot open serial device {self.device}: {error.args[-1]}",
+                remedy="is the adapter plugged in, and may this user open it (group dialout)?",
+            ) from error
+        self._loop.add_reader(self._fd, self._on_readable)
+
+    def _set_up(self) -> None:
+        tty.setraw(self._fd, termios.TCSANOW)
+        settings = termios.tcgetattr(self._fd)
+        settings[_IFLAG] &= ~(termios.IXOFF | termios.IXANY)
+        settings[_CFLAG] &= ~(termios.CSTOPB | termios.CRTSCTS)
+        settings[_CFLAG] |= termios.CLOCAL | termios.CREAD
+        settings[_ISPEED] = settings[_OSPEED] = BAUD_RATES[self.baud]
+        termios.tcsetattr(self._fd, termios.TCSANOW, settings)
+        termios.tcflush(self._fd, termios.TCIOFLUSH)
+
+    def close(self) -> None:
+        """Close the device; no effect on one that is closed."""
+        if self._fd >= 0:
+            self._loop.remove_reader(self._fd)
+            self._loop.remove_writer(self._fd)
+            os.close(self._fd)
+            self._fd = -1
+        self._unsent = b""
+
+    def write(self, data: bytes) -> None:
+        """Send bytes; what the device has no room for is sent as soon as it has. Closed: they are lost."""
+        if self._fd < 0:
+            return
+        waiting, self._unsent = bool(self._unsent), self._unsent + data
+        if not waiting:
+            self._send_unsent()
+
+    def _send_unsent(self) -> None:
+        try:
+            self._unsent = self._unsent[os.write(self._fd, self._unsent) :]
+        except BlockingIOError:
+            pass
+        except OSError as error:
+            self._lose(error)
+            return
+        if self._unsent:
+            self._loop.add_writer(self._fd, self._send_unsent)
+        else:
+            self._loop.remove_writer(self._fd)
+
+    def _on_readable(self) -> None:
+        try:
+            data = os.read(self._fd, _READ_SIZE)
+        except BlockingIOError:
+            return
+        except OSError as error:
+            self._lose(error)
+            return
+        if not data:
+            self._lose(OSError(errno.EIO, "the line was hung up"))
+        elif self.host is not None:
+            self.host(data, self._loop.time())
+
+    def _lose(self, error: OSError) -> None:
+        """Tell the owner on the loop's next turn: whoever is writing just now does not expect to hear of it."""
+        self.close()
+        if self.on_lost is not None:
+            on_lost, self.on_lost = self.on_lost, None
+            self._loop.call_soon(on_lost, error.strerror or str(error))
