@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
@@ -20,6 +20,8 @@ class Role(StrEnum):
 
 
 _REQUIRED = object()
+MAX_SETTINGS = 1000
+"""Settings in one request."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,8 +30,8 @@ class Param:
 
     Attributes:
         name: with its unit as suffix.
-        type: ``number``, ``integer``, ``boolean``, ``string``, ``node`` (id 1 to 127, or a name) or ``value``
-            (a number or a string).
+        type: ``number``, ``integer``, ``boolean``, ``string``, ``node`` (id 1 to 127, or a name), ``value``
+            (a number or a string) or ``values`` (whole numbers by object).
         doc: what it means.
         unit: its unit, empty for none.
         default: value where it is left out; a parameter without one is required.
@@ -289,7 +291,47 @@ _NETWORK = (
     ),
 )
 
-METHODS: dict[str, Method] = {method.name: method for method in (*_TALK, *_WHOLE, *_MOTOR, *_VEHICLE, *_NETWORK)}
+_DRY_RUN = Param("dry_run", "boolean", "only tell what would be written", default=False)
+_PRODUCT = Param("product_code", "integer", "of the drive that the settings are of (object 0x1018/2)", default=None)
+_SETTINGS = Param("values", "values", "settings by object, as 0x6083 or 0x2078/2; those of the profile where left out",
+                  default=None)  # fmt: skip
+_CHANGED = "node, name, dry_run, changes, saved, restarted, notes, node_state, status"
+
+_CONFIG = (
+    Method("config.dump", "Read all settings of a drive.", (_NODE,), "node, name, values, identity", Role.WATCH),
+    Method(
+        "config.diff",
+        "Compare the settings of a drive.",
+        (_NODE, _SETTINGS),
+        "node, name, compared, differences, notes",
+        Role.WATCH,
+    ),
+    Method(
+        "config.apply",
+        "Write settings to a drive and read them back; refused while anything is enabled.",
+        (_NODE, _SETTINGS, _PRODUCT, _DRY_RUN, Param("save", "boolean", "keep them, and restart it", default=False)),
+        _CHANGED,
+        Role.CONFIGURE,
+    ),
+    Method(
+        "config.backup",
+        "Read all settings of one drive or of all.",
+        (Param("node", "node", "node id, name, or all", default="all"),),
+        "drives",
+        Role.WATCH,
+    ),
+    Method(
+        "config.restore",
+        "Make a drive like the one that the settings are of: write, keep, restart, read back.",
+        (_NODE, replace(_SETTINGS, default=_REQUIRED, doc="settings by object"), _PRODUCT, _DRY_RUN),
+        _CHANGED,
+        Role.CONFIGURE,
+    ),
+)
+
+METHODS: dict[str, Method] = {
+    method.name: method for method in (*_TALK, *_WHOLE, *_MOTOR, *_VEHICLE, *_NETWORK, *_CONFIG)
+}
 
 NOTIFICATIONS = {
     "status": "params as the result of status, plus lost_samples",
@@ -368,6 +410,10 @@ def _is_text(value: Any) -> bool:
     return isinstance(value, str) and 0 < len(value) <= 256 and value.isprintable()
 
 
+def _is_settings(value: Any) -> bool:
+    return isinstance(value, dict) and len(value) <= MAX_SETTINGS and all(map(_is_integer, value.values()))
+
+
 def _is_node(value: Any) -> bool:
     return 1 <= value <= 127 if _is_integer(value) else _is_text(value)
 
@@ -378,5 +424,6 @@ _TYPES: dict[str, tuple[Callable[[Any], bool], str]] = {
     "boolean": (lambda value: isinstance(value, bool), "true or false"),
     "string": (_is_text, "a string of 1 to 256 printable characters"),
     "node": (_is_node, "a node id from 1 to 127, or a name"),
+    "values": (_is_settings, f"at most {MAX_SETTINGS} whole numbers by object"),
     "value": (lambda value: _is_number(value) or _is_text(value), "a number or a string"),
 }

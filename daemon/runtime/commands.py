@@ -7,6 +7,7 @@ from typing import Any
 
 from canhelm.errors import Refused
 from daemon.runtime.brake_commands import BrakeCommands
+from daemon.runtime.config_commands import ConfigCommands
 from daemon.runtime.handlers import Handler, Params, holder, run_motion
 from daemon.runtime.motions import Motion
 from daemon.runtime.motor_commands import MotorCommands
@@ -35,6 +36,7 @@ class Commands:
             **MotorCommands(supervisor).handlers,
             **BrakeCommands(supervisor).handlers,
             **NetworkCommands(supervisor).handlers,
+            **ConfigCommands(supervisor).handlers,
         }
         for method in supervisor.vehicle.methods:
             self.handlers[method] = self._vehicle_handler(method)

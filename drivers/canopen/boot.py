@@ -24,6 +24,7 @@ LONGEST_PAUSE_S = 1.0
 REFUSED_PAUSE_S = 2.0
 """Time before a device that was refused is looked at again."""
 DEVICE_TYPE = (0x1000, 0)
+_RESETS = (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION)
 STATE_WORDS = {int(state): state.name.lower().replace("_", "-") for state in NmtState}
 
 
@@ -237,7 +238,7 @@ class NodeBoot:
         message = f"{self._who} is lost: no guarding answer for {silent_s * 1e3:.0f} ms"
         self._leave("lost", message, "check its motor power and the CAN cable; it is configured again when it is back")
 
-    def _leave(self, kind: str, message: str, remedy: str) -> None:
+    def _leave(self, kind: str, message: str, remedy: str, severity: str = "error") -> None:
         """The node was ready and is no longer. One that is held by command is guarded on, for it guards its life."""
         device = self._device
         self._master.counters.nodes_lost += 1
@@ -248,7 +249,7 @@ class NodeBoot:
         device.node_state = NodeState.ABSENT
         device.status_sentence = message
         device.on_lost(device.fault)
-        self._master.tell(self._node, kind, "error", message, remedy)
+        self._master.tell(self._node, kind, severity, message, remedy)
 
     def _on_emcy(self, can_id: int, data: bytes, timestamp: float) -> None:
         parsed = parse_emcy(data)
@@ -267,8 +268,9 @@ class NodeBoot:
         """A person commands the node: a stop holds it until a start or a reset."""
         self._held = command in (NmtCommand.STOP, NmtCommand.ENTER_PRE_OPERATIONAL)
         self._sign_of_life.set()
+        if command in _RESETS and self._device.node_state is not NodeState.READY:
+            self._guard.disarm()  # it restarts, and answers nothing until then
         if self._held and self._device.node_state is NodeState.READY:
             words = command.name.lower().replace("_", " ")
-            self._leave(
-                "lost", f"{self._who} left operation: NMT {words} by command", "`canhelm nmt start` brings it back"
-            )
+            message = f"{self._who} left operation: NMT {words} by command"
+            self._leave("lost", message, "`canhelm nmt start` brings it back", "warning")

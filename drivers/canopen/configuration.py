@@ -65,8 +65,13 @@ class Configuration:
 
     async def differences(self, settings: Iterable[tuple[ObjectDef, int]]) -> list[Difference]:
         """Read objects and tell which differ. Raises NodeAbsent, Timeout, Aborted or DeviceFault."""
-        read = [Difference(entry, await self._sdo.read_int(entry), expected) for entry, expected in settings]
-        return [difference for difference in read if difference.found != difference.expected]
+        different: list[Difference] = []
+        for entry, expected in settings:
+            found = await self._sdo.read_int(entry)
+            if found != expected:
+                different.append(Difference(entry, found, expected))
+            await asyncio.sleep(BREATH_S)
+        return different
 
     async def verify(self) -> None:
         """Read everything back that was written. Raises Refused at the first object that differs."""

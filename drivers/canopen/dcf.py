@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 
 from drivers.canopen.eds_text import RECORD, VAR, Address
@@ -36,6 +36,10 @@ class DeviceKind:
     receive_pdos: int
     transmit_pdos: int
     lss: bool = False
+
+    def with_product(self, number: int) -> DeviceKind:
+        """The same kind, of a certain hardware and firmware."""
+        return replace(self, product_number=number)
 
 
 @dataclass(frozen=True, slots=True)

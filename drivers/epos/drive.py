@@ -26,6 +26,8 @@ NEW_REFERENCE_SPEEDS = 3.0
 NEW_REFERENCE_QC = 1000
 """A position that differs from the last by more than this, beyond what three times the top speed makes in that time, is
 no travel but a new reference (homing, restart)."""
+SENSOR_ERROR = 0x7320
+"""Also sent when a setting of the sensor is changed (Firmware Specification 14.1.46): no fault while one configures."""
 _HALF_TURN, _FULL_TURN = 1 << 31, (1 << 32) - 1
 
 _FAULTS = (State.FAULT, State.FAULT_REACTION_DISABLED, State.FAULT_REACTION_ENABLED)
@@ -375,8 +377,10 @@ class EposDrive(CanopenDevice):
         if code == 0:
             return None
         meaning, cure = emergency_words(code)
-        self.fault = self.make_fault(code, f"{self.who} reports {meaning}", cure)
-        return self.fault
+        fault = self.make_fault(code, f"{self.who} reports {meaning}", cure)
+        if code != SENSOR_ERROR or not self.configuring.locked():
+            self.fault = fault
+        return fault
 
     async def before_close(self) -> None:
         """End life guarding of a drive that is off, so that it does not report its master lost."""

@@ -20,6 +20,11 @@ class OutputBits:
         self._outputs: dict[int, int] = {}
         self._word = 0
 
+    @property
+    def own_bits(self) -> int:
+        """The bits that this program switches, as a mask."""
+        return sum(1 << bit for bit in self._resting)
+
     def use(self, output: int, bit: int, resting_level: bool) -> None:
         """Take an output.
 
@@ -35,7 +40,7 @@ class OutputBits:
         """Function, polarity and resting level first; then the mask, with which the drive begins to switch."""
         if not self._resting:
             return
-        own = sum(1 << bit for bit in self._resting)
+        own = self.own_bits
         names = ("digital_output_functions_state", "digital_output_functions_mask", "digital_output_functions_polarity")
         state, mask, polarity = (OBJECTS[name] for name in names)
         resting = sum(level << bit for bit, level in self._resting.items())

@@ -1,0 +1,188 @@
+"""Settings of drives: read, compared, written, kept; a drive at factory settings, a wrong one, a replaced one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from canhelm.errors import Interlock, Refused, UsageError
+from drivers.epos.objects import OBJECTS
+from drivers.simulated.epos import SimulatedEpos
+from vcan_tests.robot import Robot, running_robot
+
+MOTOR_TYPE, ACCELERATION, HOMING = "0x6402", "0x6083", "0x2080"
+
+
+def twin(robot: Robot, node: int) -> SimulatedEpos:
+    found = robot.network.node(node)
+    assert isinstance(found, SimulatedEpos)
+    return found
+
+
+def make_factory_new(robot: Robot, node: int) -> None:
+    """Replace a drive that is off by one from the shelf: its DIP switches set, nothing else."""
+    twin(robot, node).dictionary.forget()
+
+
+async def power_cycle(robot: Robot, node: int) -> None:
+    """Off, noticed, on, and ready again."""
+    robot.network.power_off(node)
+    await robot.until(lambda: robot.state == "waiting")
+    robot.network.power_on(node)
+    await until_idle(robot)
+
+
+async def until_idle(robot: Robot) -> None:
+    """Idle, with the brakes engaged."""
+    brakes = robot.app.devices.brakes.values()
+    await robot.until(lambda: robot.state == "idle" and all(brake.state == "engaged" for brake in brakes))
+
+
+def by_object(result: dict[str, Any], key: str = "changes") -> dict[str, dict[str, Any]]:
+    return {change["object"]: change for change in result[key]}
+
+
+async def backup(robot: Robot, node: int) -> dict[str, int]:
+    values: dict[str, int] = (await robot.call("config.dump", node=node))["values"]
+    return values
+
+
+async def change(robot: Robot, method: str = "config.apply", **params: Any) -> dict[str, Any]:
+    defaults = {"values": None, "product_code": None, "dry_run": False, "save": False}
+    return await robot.call(method, **(defaults | params))
+
+
+# --- a drive at factory settings, one with wrong motor data, one replaced ---------------------------------------------
+
+
+async def test_a_drive_at_factory_settings_is_refused_until_the_profile_was_saved_in_it() -> None:
+    async with running_robot(powered=False, booted=False, expect_errors=True) as robot:
+        make_factory_new(robot, 3)
+        robot.network.power_on("all")
+        await robot.until(lambda: robot.app.devices.by_node[3].node_state.value == "refused")
+        told = robot.app.devices.by_node[3].status_sentence
+        assert "0x6402 (motor_type) is 10 (0xA), expected 11 (0xB)" in told
+        assert "`canhelm config apply 3 --save`" in told
+        result = await change(robot, node=3, save=True)
+        assert (result["saved"], result["restarted"], result["node_state"]) == (True, True, "ready")
+        await until_idle(robot)
+        await robot.call("motor.velocity", node=3, velocity_rpm=100.0, duration_s=0.2)
+
+
+async def test_wrong_motor_data_is_told_and_mended_in_one_command() -> None:
+    async with running_robot(powered=False, booted=False, expect_errors=True) as robot:
+        twin(robot, 2).dictionary.commission({"motor_type": 1, "position_sensor_type": 2})
+        robot.network.power_on("all")
+        await robot.until(lambda: robot.app.devices.by_node[2].node_state.value == "refused")
+        differences = by_object(await robot.call("config.diff", node=2, values=None), "differences")
+        assert (differences[MOTOR_TYPE]["was"], differences[MOTOR_TYPE]["wanted"]) == (1, 11)
+        assert (differences["0x2210/2"]["was"], differences["0x2210/2"]["wanted"]) == (2, 1)
+        await change(robot, node=2, save=True)
+        await until_idle(robot)
+
+
+async def test_a_replaced_drive_is_made_like_the_old_one_in_one_command() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        await robot.call("sdo.write", node=4, object=HOMING, value=777)
+        old = await backup(robot, 4)
+        robot.network.power_off(4)
+        await robot.until(lambda: robot.state == "waiting")
+        make_factory_new(robot, 4)
+        robot.network.power_on(4)
+        await robot.until(lambda: robot.app.devices.by_node[4].node_state.value == "refused")
+        result = await change(robot, "config.restore", node=4, values=old)
+        assert (result["saved"], result["node_state"]) == (True, "ready")
+        await power_cycle(robot, 4)
+        assert await backup(robot, 4) == old
+
+
+# --- what is written -------------------------------------------------------------------------------------------------
+
+
+async def test_a_dry_run_shows_every_write_and_writes_nothing() -> None:
+    async with running_robot() as robot:
+        before = await backup(robot, 1)
+        preview = await change(robot, node=1, values={HOMING: 650}, dry_run=True)
+        assert by_object(preview)[HOMING]["wanted"] == 650
+        assert await backup(robot, 1) == before
+        done = await change(robot, node=1, values={HOMING: 650})
+        assert by_object(done).keys() == by_object(preview).keys()
+        assert (await backup(robot, 1))[HOMING] == 650
+
+
+async def test_what_was_not_saved_is_gone_after_a_restart() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        await change(robot, node=1, values={HOMING: 650})
+        await power_cycle(robot, 1)
+        assert (await backup(robot, 1))[HOMING] == 500
+
+
+async def test_nothing_is_applied_while_a_drive_is_enabled() -> None:
+    async with running_robot() as robot:
+        await robot.call("motor.enable", node=2)
+        with pytest.raises(Interlock):
+            await change(robot, node=1, values={HOMING: 650})
+        assert (await backup(robot, 1))[HOMING] == 500
+        await robot.call("motor.disable", node=2)
+
+
+async def test_a_setting_that_counts_from_the_start_is_refused_without_saving() -> None:
+    async with running_robot() as robot:
+        with pytest.raises(Refused, match="after saving and a restart"):
+            await change(robot, node=1, values={MOTOR_TYPE: 10})
+        assert robot.state == "idle"
+
+
+async def test_node_id_and_bit_rate_are_never_changed() -> None:
+    async with running_robot() as robot:
+        result = await change(robot, node=1, values={"0x2000": 9, "0x2001": 3, HOMING: 650})
+        assert "0x2000 (node_id_software) stays 1, not 9" in result["notes"][0]
+        assert by_object(result).keys() >= {HOMING}
+        after = await backup(robot, 1)
+        assert (after["0x2000"], after["0x2001"]) == (1, 0)
+
+
+async def test_a_value_that_does_not_fit_is_refused_before_anything_is_written() -> None:
+    async with running_robot() as robot:
+        with pytest.raises(UsageError, match="0x6410/1"):
+            await change(robot, node=1, values={HOMING: 650, "0x6410/1": 9000})
+        assert (await backup(robot, 1))[HOMING] == 500
+
+
+async def test_settings_of_another_hardware_are_refused() -> None:
+    async with running_robot() as robot:
+        with pytest.raises(Refused, match="product 0x64102011"):
+            await change(robot, node=1, values={HOMING: 650}, product_code=0x6410_2011)
+
+
+async def test_settings_that_the_profile_decides_are_marked() -> None:
+    async with running_robot() as robot:
+        preview = await change(robot, node=1, values={ACCELERATION: 1}, dry_run=True)
+        assert "the profile sets it to" in by_object(preview)[ACCELERATION]["note"]
+
+
+async def test_saving_never_keeps_the_output_of_a_brake_switched_on() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        assert twin(robot, 1).dictionary.number("digital_output_functions_mask") == 1 << 12
+        await change(robot, node=1, values={HOMING: 650}, save=True)
+        await until_idle(robot)
+        robot.network.power_off(1)
+        twin(robot, 1).dictionary.restart()
+        assert twin(robot, 1).dictionary.number("digital_output_functions_mask") == 0
+
+
+async def test_objects_of_later_firmware_are_probed_and_left_out() -> None:
+    async with running_robot() as robot:
+        later = {entry.address for entry in OBJECTS.objects if entry.firmware == "later"}
+        assert not later & (await backup(robot, 1)).keys()
+        result = await change(robot, node=1, values={"0x6067": 5}, dry_run=True)
+        assert "0x6067 (position_window) is absent" in result["notes"][0]
+
+
+async def test_a_robot_drives_on_after_its_settings_were_changed() -> None:
+    async with running_robot() as robot:
+        await change(robot, node=3, values=await backup(robot, 3), save=True)
+        await until_idle(robot)
+        driven = await robot.call("drive.parallel", angle_deg=0.0, speed_m_s=0.3, duration_s=1.0)
+        assert driven["motion"]
