@@ -50,6 +50,7 @@ def simulate(
         duplicate: Share that noise doubles.
         delay: Share that noise delays.
     """
+    from daemon.runtime.clock import run_precise
     from drivers.simulated.serial_wire import SerialNoise
     from profiles.loader import load
 
@@ -60,14 +61,14 @@ def simulate(
     serial = _RS232.fullmatch(bus)
     if serial:
         baud = int(serial[1] or DEFAULT_BAUD)
-        asyncio.run(_on_terminal(robot, nodes, gateway, baud, SerialNoise(*shares), seed, json))
+        run_precise(_on_terminal(robot, nodes, gateway, baud, SerialNoise(*shares), seed, json))
     elif bus == "simulated" or bus.startswith("rs232") or ":" not in bus:
         remedy = "give rs232:pty, or a CAN interface such as socketcan:vcan0"
         raise UsageError(f"nobody could reach a network on {bus!r}", value=bus, remedy=remedy)
     elif gateway is not None or shares != _CLEAN:
         raise UsageError("a gateway and noise are for the serial line", remedy="give --bus rs232:pty")
     else:
-        asyncio.run(_on_interface(robot, nodes, bus, seed))
+        run_precise(_on_interface(robot, nodes, bus, seed))
     return 0
 
 

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from daemon.runtime.clock import Deadlock, Ticker, VirtualTimeLoop, run_virtual
+from daemon.runtime.clock import Deadlock, Ticker, VirtualTimeLoop, run_precise, run_virtual
 
 
 async def test_tests_run_on_virtual_time() -> None:
@@ -171,6 +171,18 @@ async def test_a_callback_may_stop_its_own_ticker() -> None:
     ticker.start()
     await asyncio.sleep(1.0)
     assert ticker.ticks == 1
+
+
+def test_precise_timers_are_finer_than_a_millisecond() -> None:
+    async def shortest() -> float:
+        loop, waits = asyncio.get_running_loop(), []
+        for _ in range(50):
+            began = loop.time()
+            await asyncio.sleep(0.0001)
+            waits.append(loop.time() - began)
+        return min(waits)
+
+    assert run_precise(shortest()) < 0.0009
 
 
 @pytest.mark.real_time

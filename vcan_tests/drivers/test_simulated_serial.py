@@ -6,12 +6,14 @@ import asyncio
 import os
 import struct
 from dataclasses import replace
+from random import Random
 
 import pytest
 
 from drivers.bus.contract import RTR_FLAG
 from drivers.canopen.objects import Access
 from drivers.epos.serial_frames import (
+    Opcode,
     make_frame,
     make_initiate_segmented_read,
     make_initiate_segmented_write,
@@ -23,9 +25,9 @@ from drivers.epos.serial_frames import (
     make_send_nmt,
     make_write_object,
 )
-from drivers.simulated.serial import EposTiming, SimulatedSerial
+from drivers.simulated.serial import EposTiming
 from drivers.simulated.serial_wire import SerialNoise, SerialPty
-from vcan_tests.drivers.serial_bench import FAIL, OK, SerialBench, Silence
+from vcan_tests.drivers.simulated_serial_bench import FAIL, OK, SerialBench, Silence
 
 STATUSWORD = make_read_object(1, 0x6041, 0)
 ENCODER_POSITION = make_read_object(5, 0x6004, 0)
@@ -414,16 +416,29 @@ async def test_a_pulled_cable_loses_bytes_both_ways() -> None:
     assert (await bench.ask(STATUSWORD)).error == 0
 
 
-async def test_random_bytes_end_without_an_exception_and_the_drive_recovers() -> None:
-    bench = await SerialBench.booted(noise=SerialNoise(lose=0.05, flip=0.2, duplicate=0.05))
-    for _ in range(300):
-        bench.write(STATUSWORD)
-        await asyncio.sleep(0.01)
-    clean = SimulatedSerial(bench.node)
-    clean.cable.host = bench._hear
-    bench.serial = clean
+async def test_no_bytes_make_the_drive_stumble() -> None:
+    """Half of them are frames with a right CRC, so that random commands are carried out, too."""
+    bench = await SerialBench.booted(timing=EposTiming(forwarding_timeout_s=0.01))
+    trouble: list[str] = []
+    asyncio.get_running_loop().set_exception_handler(lambda _, context: trouble.append(context["message"]))
+    random = Random(1)
+    for _ in range(2000):
+        if random.random() < 0.5:
+            bench.write(random.randbytes(random.randrange(1, 20)))
+        else:
+            frame = make_frame(random.choice(tuple(Opcode)), random.randbytes(2 * random.randrange(1, 8)))
+            bench.write(frame[:1])
+            await asyncio.sleep(0.001)
+            bench.write(frame[1:])
+        await asyncio.sleep(random.choice((0.005, 0.02, 0.6)))
+        bench.write(OK)
+    bench.network.power_off(1)
+    bench.network.power_on(1)
+    await asyncio.sleep(0.6)
     bench.heard.clear()
     assert (await bench.ask(STATUSWORD)).error == 0
+    assert trouble == []
+    assert bench.serial.counters.requests > 500
 
 
 # The pseudo terminal
