@@ -44,11 +44,12 @@ class BrakeCommands:
         return {"brakes": [brake.status() for brake in brakes]}
 
     async def _release(self, params: Params, lease: str | None) -> dict[str, Any]:
-        brakes = self._brakes(params)
+        brakes, force = self._brakes(params), bool(params.get("force", False))
         for brake in brakes:
-            self._check_release(brake, len(brakes), force=bool(params.get("force", False)))
+            self._check_release(brake, len(brakes), force=force)
             await self._require_drive_of(brake)
         for brake in brakes:
+            self._check_release(brake, len(brakes), force=force)  # something may have begun while another one opened
             await brake.release()
         return {"brakes": [brake.status() for brake in brakes]}
 

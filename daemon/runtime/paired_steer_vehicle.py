@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 from typing import Any
 
@@ -96,17 +97,18 @@ class StreamMotion(PairedSteerMotion):
         super().__init__(kind, drives, lease, law, target)
         self._wanted = target
         self._valid_for_s = valid_for_s
+        self._taken_s = asyncio.get_running_loop().time()
         self._age_s = 0.0
 
     def take(self, target: PairedSteerTarget, valid_for_s: float) -> None:
         """A new value."""
         self._wanted = self._wanted if target == self._wanted else target
         self._valid_for_s = valid_for_s
-        self._age_s = 0.0
+        self._taken_s = asyncio.get_running_loop().time()
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """Follow the newest value, or come to rest where it is too old."""
-        self._age_s += dt_s
+        self._age_s = measurement.time_s - self._taken_s
         self._target = self._wanted if self._age_s <= self._valid_for_s else None
         if not self.stop_reason and self._target is None and self._age_s > self._valid_for_s + STREAM_END_S:
             self.stop("no new value came")

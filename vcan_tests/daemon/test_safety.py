@@ -165,3 +165,27 @@ async def test_a_lease_that_has_run_out_holds_no_new_motion() -> None:
         await asyncio.sleep(robot.app.service.lease_timeout_s + 0.1)
         with pytest.raises(Refused, match="has run out"):
             await robot.app.service.call("motor.velocity", {"node": 1, "velocity_rpm": 100.0}, lease)
+
+
+async def test_a_value_of_a_stream_grows_old_while_the_daemon_hangs() -> None:
+    async with running_robot() as robot:
+        for _ in range(40):
+            await robot.call("drive.set", direction_deg=0.0, speed_m_s=0.3, valid_for_ms=100)
+            await asyncio.sleep(0.05)
+        robot.app.cycle.stop()
+        await asyncio.sleep(0.15)
+        robot.app.cycle.start()
+        await asyncio.sleep(0.02)
+        (motion,) = robot.app.service.status()["motions"]
+        assert motion["value_age_ms"] >= 200
+        await robot.call("stop")
+
+
+async def test_the_second_brake_is_not_released_where_a_drive_was_enabled_while_the_first_one_opened() -> None:
+    async with running_robot() as robot:
+        releasing = _begin(robot, "brake.release", pair="all")
+        enabling = _begin(robot, "motor.enable", node="rear_left")
+        assert isinstance(await releasing, Interlock)
+        assert [brake.state for brake in robot.app.devices.brakes.values()].count(BrakeState.ENGAGED) == 1
+        assert not isinstance(await enabling, CanhelmError)
+        await robot.call("motor.disable", node="rear_left")
