@@ -249,6 +249,8 @@ class NodeBoot:
         device.node_state = NodeState.ABSENT
         device.status_sentence = message
         device.on_lost(device.fault)
+        if self._guarded is not None and not self._guarded.done():
+            self._guarded.set_exception(NodeAbsent(message, node=self._node, remedy=remedy))
         self._master.tell(self._node, kind, severity, message, remedy)
 
     def _on_emcy(self, can_id: int, data: bytes, timestamp: float) -> None:
