@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import termios
 import tty
 from collections import deque
 from collections.abc import Callable
@@ -17,6 +18,8 @@ from random import Random
 
 BITS_PER_BYTE = 10
 READ_SIZE = 4096
+_INPUT_SPEED, _OUTPUT_SPEED = 4, 5
+"""Places in the settings of a terminal (termios.tcgetattr)."""
 
 Receiver = Callable[[bytes, float], None]
 """Takes bytes and the time at which the last of them ended."""
@@ -157,6 +160,8 @@ class SerialCable:
 class SerialPty:
     """The host's end of a cable as a pseudo terminal that any program can open like a serial port.
 
+    It has the cable's baud rate at first. Where a host sets another one, both sides get garbage, as on a real line.
+
     Args:
         cable: the cable; this becomes its host.
 
@@ -169,18 +174,32 @@ class SerialPty:
         self._cable = cable
         self._near, self._far = os.openpty()  # the far end stays open here, so that hosts may come and go
         tty.setraw(self._far)
+        self._speed = getattr(termios, f"B{cable.baud}", None)  # terminals have no 14400 bit/s
+        self._set_speed()
+        self._garbage = Random(cable.baud)
         os.set_blocking(self._near, False)
         self.device = os.ttyname(self._far)
         self.lost = 0
         cable.host = self._to_host
         asyncio.get_running_loop().add_reader(self._near, self._on_readable)
 
+    def _set_speed(self) -> None:
+        if self._speed is not None:
+            settings = termios.tcgetattr(self._far)
+            settings[_INPUT_SPEED] = settings[_OUTPUT_SPEED] = self._speed
+            termios.tcsetattr(self._far, termios.TCSANOW, settings)
+
+    def _as_heard(self, data: bytes) -> bytes:
+        """What the other side makes of these bytes at its own baud rate."""
+        agreed = self._speed in (None, termios.tcgetattr(self._far)[_OUTPUT_SPEED])
+        return data if agreed else self._garbage.randbytes(len(data))
+
     def _on_readable(self) -> None:
-        self._cable.write(os.read(self._near, READ_SIZE))
+        self._cable.write(self._as_heard(os.read(self._near, READ_SIZE)))
 
     def _to_host(self, data: bytes, _: float) -> None:
         try:
-            self.lost += len(data) - os.write(self._near, data)
+            self.lost += len(data) - os.write(self._near, self._as_heard(data))
         except BlockingIOError:
             self.lost += len(data)
 

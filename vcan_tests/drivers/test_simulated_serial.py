@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import struct
+import termios
 from dataclasses import replace
 from random import Random
 
@@ -467,6 +468,21 @@ async def test_a_host_opens_the_terminal_and_reads_the_same_bytes() -> None:
     assert await read_exactly(fd, 2) == OK + b"\0"
     os.write(fd, OK)
     assert (await read_exactly(fd, 11)).hex(" ") == "03 00 00 00 00 40 01 00 00 5d 46"
+    os.close(fd)
+    pty.close()
+    await bench.network.close()
+
+
+@pytest.mark.real_time
+async def test_a_host_at_another_baud_rate_gets_garbage() -> None:
+    bench = await SerialBench.booted(baud=9600)
+    pty = SerialPty(bench.serial.cable)
+    fd = os.open(pty.device, os.O_RDWR | os.O_NOCTTY)
+    settings = termios.tcgetattr(fd)
+    settings[4] = settings[5] = termios.B19200
+    termios.tcsetattr(fd, termios.TCSANOW, settings)
+    os.write(fd, 8 * STATUSWORD)
+    assert set(await read_exactly(fd, 8)) - set(OK + FAIL)
     os.close(fd)
     pty.close()
     await bench.network.close()
