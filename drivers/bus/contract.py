@@ -11,6 +11,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 RTR_FLAG = 0x4000_0000
 ID_MASK = 0x7FF
@@ -28,6 +29,8 @@ class BusCounters:
     """Frames whose deadline had passed before they reached the wire: dropped, never sent late."""
     dropped_full: int = 0
     """Frames refused because the transmit queue was full."""
+    error_frames: int = 0
+    """Error frames seen: disturbances, bad wiring, or a node with another bit rate."""
 
 
 class Bus(ABC):
@@ -65,6 +68,10 @@ class Bus(ABC):
     @abstractmethod
     def load(self) -> float:
         """Share of the last second that the wire was busy, 0 to 1."""
+
+    def details(self) -> dict[str, Any]:
+        """What else there is to tell of the interface, for ``status``; keys carry units."""
+        return {}
 
     @abstractmethod
     async def close(self) -> None:

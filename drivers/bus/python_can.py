@@ -65,7 +65,6 @@ class PythonCanBus(Bus):
         interface: python-can's name of the kind of interface.
         channel: which one.
         down: why the interface does not work at the moment; None while it does.
-        error_frames: error frames that the controller reported.
         foreign: frames that are no classic base frames, and garbage of the adapter.
     """
 
@@ -74,7 +73,6 @@ class PythonCanBus(Bus):
         self.interface = interface
         self.channel = channel
         self.down: str | None = None
-        self.error_frames = 0
         self.foreign = 0
         self._send_timeout_s = 0.0 if interface == "socketcan" else SERIAL_SEND_TIMEOUT_S
         self._meter = LoadMeter(bit_rate)
@@ -204,7 +202,7 @@ class PythonCanBus(Bus):
                 self.receiver(can_id, data, stamp)
 
     def _take_error(self, message: can.Message) -> None:
-        self.error_frames += 1
+        self.counters.error_frames += 1
         if message.arbitration_id & _ERROR_CLASS_BUS_OFF and self.down is None:
             self.down = "bus-off"
             LOGGER.error("%s is bus-off (%s)", self.name, "check wiring, termination and bit rate; " + self._remedy())

@@ -56,6 +56,11 @@ class Guard:
         self._asked_s = None
         self._toggle = None
 
+    @property
+    def armed(self) -> bool:
+        """Whether the node is guarded."""
+        return self._armed
+
     def disarm(self) -> None:
         """Ask no more."""
         self._armed = False

@@ -5,9 +5,8 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
-from canhelm.errors import Aborted, NodeAbsent, Timeout, UsageError
+from canhelm.errors import UsageError
 from drivers.bus.contract import Bus, FrameHandler
 from drivers.canopen.codes import NmtCommand
 from drivers.canopen.counters import CanopenCounters
@@ -20,8 +19,6 @@ from profiles.schema import Network
 
 SEGMENT_BITS = 300
 """Time for each segment of a block transfer, in bit times: a frame of 8 bytes, and as long again for others."""
-SCAN_AT_ONCE = 16
-"""Nodes that a scan asks at the same time, so that it does not fill the transmit queue."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,6 +150,10 @@ class Master:
         self._guards[node] = guard
         return guard
 
+    def guards(self, node: int) -> bool:
+        """Whether a node is guarded now."""
+        return node in self._guards and self._guards[node].armed
+
     def _send_guard_request(self, can_id: int) -> None:
         deadline = asyncio.get_running_loop().time() + REPEAT_AFTER * self.network.guard_time_ms / 1e3
         self.bus.send(can_id, b"", deadline)
@@ -161,50 +162,3 @@ class Master:
         """Send the guard requests that are due and notice lost nodes; called by good control cycles only."""
         for guard in self._guards.values():
             guard.due(now_s)
-
-    # --- scan ----------------------------------------------------------------------------------------------------
-
-    async def scan(self, timeout_s: float = 0.1) -> list[dict[str, Any]]:
-        """Who is on the bus.
-
-        Args:
-            timeout_s: how long each node may take to answer.
-
-        Returns:
-            One entry a node that answers: node, name (as in the profile), device_type, device_name, vendor_id,
-            product_code.
-        """
-        present: list[int] = []
-        for first in range(1, 128, SCAN_AT_ONCE):
-            nodes = range(first, min(first + SCAN_AT_ONCE, 128))
-            answers = await asyncio.gather(*(self._answers(node, timeout_s) for node in nodes))
-            present += [node for node, answered in zip(nodes, answers, strict=True) if answered]
-        return [await self._describe(node, timeout_s) for node in present]
-
-    async def _answers(self, node: int, timeout_s: float) -> bool:
-        try:
-            await self.sdo(node).read_raw((0x1000, 0), timeout_s)
-        except NodeAbsent:
-            return False
-        except Aborted:
-            return True
-        return True
-
-    async def _describe(self, node: int, timeout_s: float) -> dict[str, Any]:
-        def number(raw: bytes) -> str:
-            return f"0x{int.from_bytes(raw, 'little'):08X}"
-
-        async def read(index: int, sub: int) -> bytes:
-            try:
-                return await self.sdo(node).read_raw((index, sub), timeout_s)
-            except (Aborted, NodeAbsent, Timeout):
-                return b""
-
-        return {
-            "node": node,
-            "name": self.names.get(node, ""),
-            "device_type": number(await read(0x1000, 0)),
-            "device_name": (await read(0x1008, 0)).decode("latin-1"),
-            "vendor_id": number(await read(0x1018, 1)),
-            "product_code": number(await read(0x1018, 2)),
-        }

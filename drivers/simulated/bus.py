@@ -24,6 +24,9 @@ QUEUE_DEPTH = 64
 ERROR_FRAME_BITS = 20 + INTERMISSION_BITS
 """Error flag and its echo (12 bits), delimiter (8) and intermission (Bosch CAN 2.0 part A, 3.1.3)."""
 
+ERROR_STEP, ERROR_PASSIVE, BUS_OFF = 8, 128, 256
+"""What each error adds to a participant's counter, and where that makes it error-passive and bus-off."""
+
 
 class SimulatedPort(Bus):
     """One participant's connection to a simulated bus; made by :meth:`SimulatedBus.port`.
@@ -38,6 +41,7 @@ class SimulatedPort(Bus):
         queue_high_water: most frames that were ever queued at a time.
         lost: own frames lost because the cable was pulled or the port closed.
         receiver_errors: exceptions that ``receiver`` or a tap raised.
+        errors: error counter of a participant with another bit rate than the bus.
     """
 
     def __init__(self, medium: SimulatedBus, participant: str, depth: int) -> None:
@@ -51,6 +55,7 @@ class SimulatedPort(Bus):
         self.queue_high_water = 0
         self.lost = 0
         self.receiver_errors = 0
+        self.errors = 0
         self._medium = medium
 
     async def open(self) -> None:
@@ -60,6 +65,12 @@ class SimulatedPort(Bus):
     def accept(self, ids: Iterable[int]) -> None:
         """Let only these 11-bit identifiers through to ``receiver``, data and remote frames alike; taps see all."""
         self.accepted = frozenset(ids)
+        self._medium.forget_routes()
+
+    def set_bit_rate(self, bit_rate: int) -> None:
+        """Begin anew with a bit rate, which may be another one than the bus has: see :class:`SimulatedBus`."""
+        self.bit_rate = bit_rate
+        self.errors = 0
         self._medium.forget_routes()
 
     def send(self, can_id: int, data: bytes = b"", deadline_s: float = math.inf) -> None:
@@ -81,6 +92,10 @@ _Queued = tuple[int, int, int, bytes, int, float, SimulatedPort]
 
 class SimulatedBus:
     """The medium that joins all ports. Of everything queued when the wire gets free, the lowest identifier goes first.
+
+    A participant with another bit rate understands nothing and takes every frame for an error. It destroys frames of
+    others until its error counter makes it error-passive. Its own frames are all destroyed, until it is bus-off; then
+    its ``connected`` is False (Bosch CAN 2.0 part A, 8: counts of 8, limits 128 and 256).
 
     Args:
         bit_rate: bit/s.
@@ -105,6 +120,7 @@ class SimulatedBus:
         self._meter = LoadMeter(bit_rate)
         self._ports: list[SimulatedPort] = []
         self._routes: dict[int, tuple[SimulatedPort, ...]] = {}
+        self._strangers: tuple[SimulatedPort, ...] = ()
         self._timer: asyncio.TimerHandle | None = None
         self._queue: list[_Queued] = []
         self._behind: deque[tuple[float, _Queued]] = deque()
@@ -154,6 +170,7 @@ class SimulatedBus:
     def forget_routes(self) -> None:
         """Work out anew who gets which identifier."""
         self._routes.clear()
+        self._strangers = tuple(port for port in self._ports if port.bit_rate != self.bit_rate)
 
     def transmit(self, port: SimulatedPort, can_id: int, data: bytes, deadline_s: float) -> None:
         """Queue a frame of ``port`` as of now: the loop's time, or the stamp of the frame being delivered."""
@@ -240,7 +257,9 @@ class SimulatedBus:
         jump_to: Callable[[float], bool] = getattr(loop, "jump_to", _cannot_jump)
         now = max(loop.time(), self._end_s)
         while (sent := self._current) is not None and (self._end_s <= now or jump_to(self._end_s)):
-            if self._disturbed and self._random.random() < self._disturbed:
+            if (self._strangers and self._spoilt_by_strangers(sent[6])) or (
+                self._disturbed and self._random.random() < self._disturbed
+            ):
                 self._repeat(sent)
             else:
                 self._complete(sent)
@@ -252,6 +271,8 @@ class SimulatedBus:
     def _repeat(self, destroyed: _Queued) -> None:
         """Signal an error and let the frame take part in the next arbitration again."""
         self.error_frames += 1
+        for port in self._ports:
+            port.counters.error_frames += port.connected
         bits = destroyed[4] - INTERMISSION_BITS + ERROR_FRAME_BITS
         self._free_s = self._start_s + bits * self._bit_s
         self._meter.add(self._free_s, bits)
@@ -291,7 +312,23 @@ class SimulatedBus:
                 self._report(port, error)
 
     def _find_route(self, number: int) -> tuple[SimulatedPort, ...]:
-        return tuple(port for port in self._ports if port.accepted is None or number in port.accepted)
+        return tuple(
+            port
+            for port in self._ports
+            if (port.accepted is None or number in port.accepted) and port.bit_rate == self.bit_rate
+        )
+
+    def _is_destroyed(self, sender: SimulatedPort) -> bool:
+        """Whether a disturbance or a participant with another bit rate spoils a frame; the errors are counted."""
+        spoilt = bool(self._disturbed) and self._random.random() < self._disturbed
+        for port in self._strangers:
+            limit = BUS_OFF if port is sender else ERROR_PASSIVE
+            if port.connected and port.errors < limit:
+                port.errors += ERROR_STEP
+                spoilt = True
+            if port.errors >= BUS_OFF:
+                port.connected = False
+        return spoilt or sender in self._strangers
 
     def _report(self, port: SimulatedPort, error: Exception) -> None:
         port.receiver_errors += 1

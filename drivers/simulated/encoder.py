@@ -180,7 +180,8 @@ class SimulatedEncoder(SimulatedNode):
         else:
             self.lss.reset_communication()
         self.take_node_id(self.lss.node_id)
-        self.port.bit_rate = self.lss.bit_rate or self.port.bit_rate
+        if whole and self.lss.bit_rate is not None:
+            self.port.set_bit_rate(self.lss.bit_rate)
 
     def services(self) -> dict[int, Handler]:
         """LSS is served while no process data flows; a device without a node id has nothing else to do."""

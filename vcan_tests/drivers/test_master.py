@@ -71,21 +71,6 @@ async def test_a_node_id_outside_1_to_127_has_no_sdo(node: int) -> None:
             b.master.sdo(node)
 
 
-async def test_a_scan_finds_every_node_and_no_other() -> None:
-    async with bench() as b:
-        found = await b.master.scan()
-        assert [(entry["node"], entry["name"]) for entry in found] == [
-            (1, "rear_right"),
-            (2, "rear_left"),
-            (3, "front_left"),
-            (4, "front_right"),
-            (5, "rear"),
-            (6, "front"),
-        ]
-        assert found[0]["device_type"] == "0x00200192"
-        assert found[0]["device_name"] == "EPOS"
-
-
 # --- boot-up ---------------------------------------------------------------------------------------------------------
 
 

@@ -226,7 +226,7 @@ async def test_bus_off_is_said_until_frames_come_again(links: list[ScriptedLink]
     await bus.open()
     links[0].far.send(b"bus-off")
     await asyncio.sleep(0.01)
-    assert (bus.down, bus.error_frames) == ("bus-off", 1)
+    assert (bus.down, bus.counters.error_frames) == ("bus-off", 1)
     links[0].far.send(b"181")
     await until_received(bus, 1)
     assert bus.down is None
