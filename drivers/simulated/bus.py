@@ -257,9 +257,7 @@ class SimulatedBus:
         jump_to: Callable[[float], bool] = getattr(loop, "jump_to", _cannot_jump)
         now = max(loop.time(), self._end_s)
         while (sent := self._current) is not None and (self._end_s <= now or jump_to(self._end_s)):
-            if (self._strangers and self._spoilt_by_strangers(sent[6])) or (
-                self._disturbed and self._random.random() < self._disturbed
-            ):
+            if (self._strangers or self._disturbed) and self._is_destroyed(sent[6]):
                 self._repeat(sent)
             else:
                 self._complete(sent)
