@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from canhelm.errors import UsageError
 from drivers.explain_codes import NUMBER_READERS, Reading, object_readings
 from drivers.explain_frame import frame_readings
+from drivers.explain_serial import serial_readings
 
-KINDS = ("statusword", "controlword", "emcy", "abort", "object", "frame", "nmt", "register")
+KINDS = ("statusword", "controlword", "emcy", "abort", "object", "frame", "nmt", "register", "serial")
 
 _NUMBER = re.compile(r"(?P<prefix>0x)?(?P<digits>[0-9a-f]{1,10}?)(?P<suffix>h)?", re.IGNORECASE | re.ASCII)
 
@@ -18,7 +19,8 @@ def explain(text: str, kind: str | None = None) -> list[Reading]:
     """Every reading of a code, the most likely first.
 
     Args:
-        text: ``0x0337``, ``6320h``, ``33072``, ``0x2078/1``, ``target_velocity``, ``181#3703...``.
+        text: ``0x0337``, ``6320h``, ``33072``, ``0x2078/1``, ``target_velocity``, ``181#3703...``,
+            ``10 01 41 60 00 01 AB F0``.
         kind: one of :data:`KINDS` to read it as this and nothing else; then unlikely values are read, too.
 
     Raises:
@@ -37,6 +39,10 @@ def explain(text: str, kind: str | None = None) -> list[Reading]:
 def _accepted(kind: str | None) -> str:
     if kind == "frame":
         return "give identifier#data as candump writes it, e.g. 181#3703000000000000 or 701#R"
+    if kind == "serial":
+        return (
+            "give the bytes of an RS-232 frame in hexadecimal, e.g. 10 01 41 60 00 01 AB F0 or serial:100141600001ABF0"
+        )
     if kind == "object":
         return "give a name or an address, e.g. target_velocity, 0x6041 or 0x2078/1; canhelm object list shows all"
     return "give a number (0x0337, 6320h), an object (0x2078/1, target_velocity) or a frame (181#3703000000000000)"
@@ -46,6 +52,7 @@ def _readings(text: str, kind: str | None) -> Iterator[Reading]:
     if "#" in text:
         yield from frame_readings(text)
         return
+    yield from serial_readings(text)
     yield from object_readings(text)
     for value, digits in _numbers(text):
         for name, read in NUMBER_READERS.items():

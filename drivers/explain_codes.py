@@ -30,7 +30,7 @@ class Reading:
     """One way to read a code.
 
     Attributes:
-        kind: one of statusword, controlword, emcy, abort, object, frame, nmt, register.
+        kind: one of statusword, controlword, emcy, abort, object, frame, nmt, register, serial.
         title: the code with its name.
         meaning: what it says.
         details: what its parts say, by label.

@@ -173,7 +173,7 @@ def _mapped(pdo: PdoMap, name: str, node: int, data: bytes) -> Reading:
         part = data[offset : offset + entry.type.bits // 8]
         offset += entry.type.bits // 8
         if offset <= len(data):
-            details[f"{entry.name} ({entry.address})"] = _words(entry, part)
+            details[f"{entry.name} ({entry.address})"] = object_words(entry, part)
     sender = "from" if name.startswith("T") else "to"
     cut = f", cut short: {len(data)} of {pdo.size} bytes" if len(data) < pdo.size else ""
     meaning = f"Process data {sender} the node{cut}."
@@ -187,7 +187,7 @@ def _trouble(pdo: PdoMap, data: bytes) -> tuple[str, str]:
     return (STATES[state].cause, STATES[state].cure) if state is not None else ("", "")
 
 
-def _words(entry: ObjectDef, data: bytes) -> str:
+def object_words(entry: ObjectDef, data: bytes) -> str:
     """The value of an object's bytes for people; the bytes where they do not fit the object."""
     if entry.type.bits != len(data) * 8 and entry.type.bits:
         return f"{data.hex(' ')} ({len(data)} bytes; the object has {entry.type.bits // 8})"
@@ -241,9 +241,8 @@ def _sdo(sender: str, services: dict[int, _SdoReader]) -> Callable[[int, bytes],
     return read
 
 
-def _object_of(data: bytes) -> list[tuple[str, ObjectDef | None, str]]:
-    """Address, object and device for each dictionary that has the multiplexer's object; alike ones once."""
-    index, sub = int.from_bytes(data[1:3], "little"), data[3]
+def objects_at(index: int, sub: int) -> list[tuple[str, ObjectDef | None, str]]:
+    """Name with address, object and device for each dictionary that has this object; alike ones once."""
     found: dict[str, tuple[str, ObjectDef | None, str]] = {}
     for device, table in DICTIONARIES.items():
         entry = table.at(index, sub)
@@ -252,11 +251,16 @@ def _object_of(data: bytes) -> list[tuple[str, ObjectDef | None, str]]:
     return list(found.values()) or [(f"0x{index:04X}/{sub} (in no dictionary)", None, "")]
 
 
+def _objects_of(data: bytes) -> list[tuple[str, ObjectDef | None, str]]:
+    """The objects that the multiplexer of an SDO frame may mean."""
+    return objects_at(int.from_bytes(data[1:3], "little"), data[3])
+
+
 def _with_object(action: str, show_value: bool) -> _SdoReader:
     """A reader of a frame with multiplexer, and with an expedited value or a length where ``show_value`` says so."""
 
     def read(title: str, data: bytes) -> Iterator[Reading]:
-        for name, entry, device in _object_of(data):
+        for name, entry, device in _objects_of(data):
             details = _expedited(entry, data) if show_value else {}
             meaning = entry.meaning if entry else "An object that neither EPOS 24/5 nor encoder has."
             source = "CiA 301 7.2.4.3"
@@ -270,7 +274,7 @@ def _expedited(entry: ObjectDef | None, data: bytes) -> dict[str, str]:
         return {"length": f"{int.from_bytes(data[4:], 'little')} bytes, in segments that follow"}
     size = 4 - (data[0] >> 2 & 3) if data[0] & 0x01 else (entry.type.bits // 8 if entry and entry.type.bits else 4)
     value = data[4 : 4 + size]
-    return {"value": _words(entry, value) if entry else value.hex(" ")}
+    return {"value": object_words(entry, value) if entry else value.hex(" ")}
 
 
 def _segment(action: str, carries_data: bool) -> _SdoReader:
@@ -287,7 +291,7 @@ def _segment(action: str, carries_data: bool) -> _SdoReader:
 
 def _abort(title: str, data: bytes) -> Iterator[Reading]:
     code = int.from_bytes(data[4:], "little")
-    for name, _, device in _object_of(data):
+    for name, _, device in _objects_of(data):
         label = f"{title}: abort 0x{code:08X} at {name}"
         if code in ABORTS:
             yield code_reading("frame", label, ABORTS[code], rank=0, assumes=device)

@@ -15,7 +15,7 @@ from typing import Protocol
 from drivers.bus.wire_time import LoadMeter
 from drivers.epos.serial_answers import Answer
 from drivers.epos.serial_frames import MAX_WORDS, frame_size
-from drivers.epos.serial_handshake import BITS_PER_BYTE, Handshake, Outcome, Phase
+from drivers.epos.serial_handshake import BITS_PER_BYTE, Exchange, Outcome, Phase
 
 _FILLER = bytes(frame_size(MAX_WORDS - 1))
 """Ends any frame whose rest a drive may still be waiting for: the CRC of what it completes is wrong."""
@@ -91,21 +91,34 @@ class Conversation:
     Args:
         transport: carries the bytes.
         baud: bit/s.
+        exchange: how one request and its answer go over the line.
         timing: how long to wait.
         on_end: called when an exchange has ended and the line is free for the next one.
 
     Attributes:
         counters: what went over the line.
-        handshake: the exchange; holds the answer.
+        exchange: as above; holds the answer.
     """
 
     def __init__(
-        self, transport: Transport, baud: int, timing: SerialTiming, on_end: Callable[[Outcome], None]
+        self,
+        transport: Transport,
+        baud: int,
+        exchange: Exchange,
+        timing: SerialTiming,
+        on_end: Callable[[Outcome], None],
     ) -> None:
         self.counters = SerialCounters()
-        self.handshake = Handshake(baud)
+        self.exchange = exchange
         self._loop = asyncio.get_running_loop()
         self._timing = timing
+        self._patience_s = {
+            Phase.READY: timing.acknowledge_s,
+            Phase.ACCEPTED: timing.acknowledge_s,
+            Phase.ANSWER: timing.answer_s,
+            Phase.REST: timing.byte_s,
+            Phase.SENDING: 0.0,
+        }
         self._on_end = on_end
         self._byte_s = BITS_PER_BYTE / baud
         self._meter = LoadMeter(baud)
@@ -127,12 +140,12 @@ class Conversation:
     @property
     def answer(self) -> Answer:
         """The answer of the last exchange that was answered."""
-        return self.handshake.answer
+        return self.exchange.answer
 
     @property
     def heard(self) -> bool:
         """Whether the drive has taken the operation code of the exchange that runs, and with it the request."""
-        return self.handshake.phase is not Phase.READY
+        return self.exchange.phase is not Phase.READY
 
     def load(self) -> float:
         """Share of the last second that bytes of either direction kept the line busy, 0 to 1."""
@@ -142,8 +155,9 @@ class Conversation:
         """Begin an exchange on a free line."""
         self.counters.exchanges += 1
         self._asking = True
-        self._send(self.handshake.begin(request, self._loop.time()))
-        self._wait(self._timing.acknowledge_s + 2 * self._byte_s, self._on_silence)
+        first = self.exchange.begin(request, self._loop.time())
+        self._send(first)
+        self._await_phase(len(first))
 
     def abandon(self) -> None:
         """Say nothing more and expect nothing: the line is gone."""
@@ -160,14 +174,14 @@ class Conversation:
         if not self._asking:
             self._disturb(len(data))
             return
-        handshake, phase = self.handshake, self.handshake.phase
-        reply = handshake.feed(data, stamp_s)
+        exchange, phase = self.exchange, self.exchange.phase
+        reply = exchange.feed(data, stamp_s)
         if reply:
             self._send(reply)
-        if handshake.outcome is not None:
-            self._end(handshake.outcome)
-        elif handshake.phase is not phase or phase is Phase.REST:
-            self._wait(self._patience_s(handshake.phase) + (len(reply) + 1) * self._byte_s, self._on_silence)
+        if exchange.outcome is not None:
+            self._end(exchange.outcome)
+        elif exchange.phase is not phase or phase is Phase.REST:
+            self._await_phase(len(reply))
 
     def _send(self, data: bytes) -> None:
         now_s, counters = self._loop.time(), self.counters
@@ -182,10 +196,10 @@ class Conversation:
         self.counters.wire_s += size * self._byte_s
         self._meter.add(now_s, size * BITS_PER_BYTE)
 
-    def _patience_s(self, phase: Phase) -> float:
-        if phase is Phase.REST:
-            return self._timing.byte_s
-        return self._timing.answer_s if phase is Phase.ANSWER else self._timing.acknowledge_s
+    def _await_phase(self, sent: int) -> None:
+        """Wait for what comes next, beyond the time that the host's own bytes and the drive's first one take."""
+        patience_s = self._patience_s[self.exchange.phase] + (sent + 1) * self._byte_s
+        self._wait(patience_s, self._on_silence)
 
     def _wait(self, delay_s: float, callback: Callable[[], None]) -> None:
         if self._timer is not None:
@@ -194,16 +208,16 @@ class Conversation:
 
     def _on_silence(self) -> None:
         """The drive says nothing more."""
-        last_word = self.handshake.give_up(self._loop.time())
+        last_word = self.exchange.give_up(self._loop.time())
         if last_word:
             self._send(last_word)
-        self._end(self.handshake.outcome or Outcome.LOST)
+        self._end(self.exchange.outcome or Outcome.LOST)
 
     # --- the end of an exchange ----------------------------------------------------------------------------------
 
     def _end(self, outcome: Outcome) -> None:
         self._asking = False
-        self._our_turn_s = max(self._loop.time(), self.handshake.sent_s)
+        self._our_turn_s = max(self._loop.time(), self.exchange.sent_s)
         if outcome is Outcome.ANSWERED:
             self._unheard = 0
             self.abandon()

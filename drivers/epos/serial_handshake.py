@@ -9,6 +9,7 @@ host's own bytes can have reached the drive is an echo of the past, a doubled by
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from enum import Enum, auto
 
 from drivers.epos.serial_answers import Answer, may_answer, parse_answer
@@ -32,6 +33,8 @@ class Phase(Enum):
     """Operation code 0, the first byte of the answer."""
     REST = auto()
     """The rest of the answer."""
+    SENDING = auto()
+    """Nothing but the end of the host's own bytes."""
 
 
 class Outcome(Enum):
@@ -50,7 +53,7 @@ class Outcome(Enum):
     """The answer is damaged: the request was carried out."""
 
 
-class Handshake:
+class Exchange(ABC):
     """The exchanges of one line, one after the other.
 
     Args:
@@ -60,7 +63,7 @@ class Handshake:
         phase: what is being waited for.
         outcome: how the last exchange ended; None while it runs.
         answer: the answer, once it is there.
-        strays: bytes that had no place in the conversation.
+        strays: bytes or frames that had no place in the conversation.
         crc_errors: answers that were damaged.
         sent_s: end of the host's last byte on the wire.
     """
@@ -71,9 +74,32 @@ class Handshake:
         self.answer = Answer()
         self.strays = 0
         self.crc_errors = 0
-        self._byte_s = BITS_PER_BYTE / baud
         self.sent_s = 0.0
+        self._byte_s = BITS_PER_BYTE / baud
         self._request = b""
+
+    @abstractmethod
+    def begin(self, request: bytes, now_s: float) -> bytes:
+        """Begin an exchange; the bytes to send at ``now_s``."""
+
+    @abstractmethod
+    def feed(self, data: bytes, stamp_s: float) -> bytes:
+        """Take bytes of the drive, the last of which ended at ``stamp_s``; the bytes to send now."""
+
+    @abstractmethod
+    def give_up(self, now_s: float) -> bytes:
+        """Nothing came in time: sets the outcome. Returns what to send, so that the drive does not wait, either."""
+
+    def _say(self, data: bytes, now_s: float) -> bytes:
+        self.sent_s = max(now_s, self.sent_s) + len(data) * self._byte_s
+        return data
+
+
+class Handshake(Exchange):
+    """The acknowledged exchange of the first generation."""
+
+    def __init__(self, baud: int) -> None:
+        super().__init__(baud)
         self._received = bytearray()
 
     def begin(self, request: bytes, now_s: float) -> bytes:
@@ -103,10 +129,6 @@ class Handshake:
             return self._garbled(now_s)
         self.outcome = Outcome.UNHEARD if self.phase is Phase.READY else Outcome.LOST
         return b""
-
-    def _say(self, data: bytes, now_s: float) -> bytes:
-        self.sent_s = max(now_s, self.sent_s) + len(data) * self._byte_s
-        return data
 
     def _take_word(self, byte: int, stamp_s: float) -> bytes:
         """The first byte that can be an answer to what the host said last."""

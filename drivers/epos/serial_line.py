@@ -18,7 +18,7 @@ from drivers.epos import serial_errors
 from drivers.epos.serial_answers import Answer
 from drivers.epos.serial_conversation import Conversation, SerialCounters, SerialTiming, Transport
 from drivers.epos.serial_frames import READS, Opcode
-from drivers.epos.serial_handshake import Outcome
+from drivers.epos.serial_handshake import Exchange, Handshake, Outcome
 
 QUEUE_DEPTH = 64
 MAX_TRIES = 3
@@ -51,6 +51,7 @@ class SerialLine:
         transport: carries the bytes.
         baud: bit/s.
         name: how people call the line, for instance its device.
+        exchange: how one request and its answer go over the line; None for the first generation's handshake.
         timing: how long to wait.
 
     Attributes:
@@ -60,7 +61,14 @@ class SerialLine:
         failures: requests that failed; an abort code of a node is an answer.
     """
 
-    def __init__(self, transport: Transport, baud: int, name: str = "", timing: SerialTiming | None = None) -> None:
+    def __init__(
+        self,
+        transport: Transport,
+        baud: int,
+        name: str = "",
+        exchange: Exchange | None = None,
+        timing: SerialTiming | None = None,
+    ) -> None:
         self.baud = baud
         self.name = name or "the serial line"
         self.down: BusOff | None = None
@@ -72,7 +80,7 @@ class SerialLine:
         self._others: deque[_Job] = deque()
         self._job: _Job | None = None
         self._began_s = self._loop.time()
-        self._talk = Conversation(transport, baud, timing or SerialTiming(), self._on_end)
+        self._talk = Conversation(transport, baud, exchange or Handshake(baud), timing or SerialTiming(), self._on_end)
 
     @property
     def counters(self) -> SerialCounters:
@@ -82,7 +90,7 @@ class SerialLine:
     @property
     def crc_errors(self) -> int:
         """Damaged answers."""
-        return self._talk.handshake.crc_errors
+        return self._talk.exchange.crc_errors
 
     def load(self) -> float:
         """Share of the last second that bytes of either direction kept the line busy, 0 to 1."""
