@@ -129,6 +129,8 @@ class Gateway309:
         self.counters.clients = len(self._clients)
         try:
             await self._converse(reader, writer, Session(self._supervisor, read_only))
+        except asyncio.CancelledError:
+            LOGGER.info("the gateway hung up on a client: the daemon is going down")
         finally:
             self._clients.discard(task)
             self.counters.clients = len(self._clients)
