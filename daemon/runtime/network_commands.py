@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from canhelm.errors import Interlock, NodeAbsent, UsageError
+from canhelm.errors import Aborted, NodeAbsent, UsageError
 from daemon.runtime.handlers import Handler, Params
+from daemon.runtime.interlocks import require_all_disabled, require_write_allowed
 from daemon.runtime.supervisor import Supervisor
 from drivers.canopen.codes import NmtCommand
 from drivers.canopen.objects import ObjectDef, ObjectTable, parse_address
 from drivers.encoder.objects import OBJECTS as ENCODER_OBJECTS
+from drivers.epos.commissioning import ABSENT
 from drivers.epos.objects import OBJECTS as EPOS_OBJECTS
 
 NMT_COMMANDS = {
@@ -45,10 +47,7 @@ class NetworkCommands:
         raise NodeAbsent(f"no node {node} in this profile", remedy="`canhelm status` lists the nodes")
 
     async def _nmt(self, params: Params, lease: str | None) -> dict[str, Any]:
-        if self._supervisor.powered:
-            raise Interlock(
-                "a drive is enabled: its network state is not changed", remedy="`canhelm stop`, then disable"
-            )
+        require_all_disabled(self._supervisor)
         command = NMT_COMMANDS[str(params["command"])]
         node = 0 if params["node"] == "all" else self._node(params["node"])
         self._supervisor.master.nmt(command, node)
@@ -76,9 +75,13 @@ class NetworkCommands:
         wanted = self._object(node, str(params["object"]))
         client = self._supervisor.master.sdo(node)
         if isinstance(wanted, ObjectDef):
-            value = await client.read(wanted)
+            try:
+                value = await client.read(wanted)
+            except Aborted as error:
+                raise self._absent(node, wanted, error) or error from None
             shown = value.hex() if isinstance(value, bytes) else value
-            return {"node": node, "object": wanted.address, "name": wanted.name, "value": shown, "unit": wanted.unit}
+            return {"node": node, "object": wanted.address, "name": wanted.name, "value": shown,
+                    "type": wanted.type.name.lower(), "unit": wanted.unit}  # fmt: skip
         raw = await client.read_raw(wanted)
         return {"node": node, "object": f"0x{wanted[0]:04X}/{wanted[1]}", "raw": raw.hex(),
                 "value": int.from_bytes(raw, "little")}  # fmt: skip
@@ -91,13 +94,27 @@ class NetworkCommands:
                 f"{params['object']} is in no table, so its type is unknown",
                 remedy="`canhelm object list` shows what can be written",
             )
-        if self._supervisor.powered and node in self._supervisor.devices.by_node:
-            raise Interlock(
-                "a drive is enabled: objects are written at rest and disabled", remedy="`canhelm motor disable`"
-            )
         value = _as_number(wanted, params["value"])
-        await self._supervisor.master.sdo(node).write(wanted, value)
-        return {"node": node, "object": wanted.address, "name": wanted.name, "value": value}
+        require_write_allowed(self._supervisor, node, wanted.index, value if isinstance(value, int) else 0)
+        try:
+            await self._supervisor.master.sdo(node).write(wanted, value)
+        except Aborted as error:
+            raise self._absent(node, wanted, error) or error from None
+        return {"node": node, "object": wanted.address, "name": wanted.name, "value": value,
+                "type": wanted.type.name.lower(), "unit": wanted.unit}  # fmt: skip
+
+    def _absent(self, node: int, wanted: ObjectDef, error: Aborted) -> Aborted | None:
+        """The refusal of an object that came with later firmware than the node's, in words; None for any other."""
+        if wanted.firmware != "later" or error.value not in ABSENT:
+            return None
+        return Aborted(
+            f"{self._supervisor.master.who(node)} does not have {wanted.address} ({wanted.name}): "
+            "it came with later firmware",
+            node=node,
+            object=wanted.address,
+            value=error.value,
+            remedy="`canhelm sdo read NODE 0x2003/1` tells its firmware; leave this object alone",
+        )
 
 
 def _as_number(wanted: ObjectDef, value: int | str) -> int | str:
