@@ -16,11 +16,9 @@ from daemon.runtime.recorder import CandumpRecorder
 from daemon.runtime.service import Service
 from daemon.runtime.supervisor import Supervisor
 from daemon.runtime.vehicles import make_vehicle
-from drivers.bus.contract import Bus
+from daemon.wires import make_wire
 from drivers.canopen.master import Master
 from drivers.devices import Devices
-from drivers.simulated.bus import SimulatedBus
-from drivers.simulated.network import SimulatedNetwork
 from profiles.schema import Profile
 
 if TYPE_CHECKING:
@@ -50,7 +48,7 @@ class App:
 
     Args:
         profile: the robot.
-        bus: ``simulated``, or ``INTERFACE:CHANNEL`` of python-can.
+        bus: the SPEC of :func:`daemon.wires.make_wire`.
         socket: path of the API's socket; None for a daemon without one (demo, tests).
         record: folder or file for a candump log; None for none.
         seed: of everything random in the simulated network.
@@ -72,33 +70,24 @@ class App:
         powered: bool = True,
         gateway: GatewayAccess | None = None,
     ) -> None:
-        self.profile = profile
-        self.network: SimulatedNetwork | None = None
-        self.medium: SimulatedBus | None = None
+        self.wire = wire = make_wire(bus, profile, seed)
+        self.profile = profile = wire.profile
+        self.network = wire.network
+        self.medium = wire.medium
+        self.bus = wire.bus
         self._powered = powered
         self._record = record
         self.recorder: CandumpRecorder | None = None
-        self.bus = self._simulated_bus(seed) if bus == "simulated" else self._real_bus(bus)
         self.master = Master(self.bus, profile.network)
         self.devices = Devices(self.master, profile)
         self.vehicle = make_vehicle(profile, self.devices)
         period_s = 1.0 / profile.network.cycle_hz
         self.supervisor = Supervisor(self.master, self.devices, self.vehicle, period_s)
-        self.cycle = Cycle(self.master, self.devices, period_s, self.supervisor.step)
+        self.cycle = Cycle(self.master, self.devices, period_s, self.supervisor.step, wire.pace, wire.reading_share)
         commands = Commands(self.supervisor, self._switch_power if self.network else None)
         self.service = Service(profile.name, self.supervisor, commands, self.bus, self.cycle)
         self.server = self._serve(socket) if socket else None
         self.gateway = self._serve_tools(gateway) if gateway else None
-
-    def _simulated_bus(self, seed: int) -> Bus:
-        self.medium = SimulatedBus(bit_rate=self.profile.network.bit_rate, name="vcan0")
-        self.network = SimulatedNetwork(self.profile, self.medium, seed)
-        return self.medium.port("master")
-
-    def _real_bus(self, spec: str) -> Bus:
-        from drivers.bus.python_can import open_bus  # here, so that a simulation does not wait for python-can
-
-        return open_bus(spec, self.profile.network.bit_rate)
 
     def _serve(self, socket: Path) -> Server:
         from daemon.api.server import Server

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -106,6 +106,7 @@ class Demo:
         profile: a robot with paired steering and simulation data.
         seed: of everything random in the simulated network.
         record: folder for the candump log, or None.
+        bus: ``simulated``, or ``rs232[@BAUD]`` for the same robot behind the serial line of its first drive.
         tell: called with a sentence at each step of the demo.
         watch: called once a control cycle, for a live view.
     """
@@ -117,13 +118,15 @@ class Demo:
         record: Path | None,
         tell: Callable[[str], None],
         watch: Callable[[App], None] | None = None,
+        bus: str = "simulated",
     ) -> None:
         if not isinstance(profile.vehicle, PairedSteerGeometry):
             raise UsageError(f"profile {profile.name} has no paired steering", remedy="the demo drives max2d")
-        self.app = app = App(profile, seed=seed, record=record)
+        self.app = app = App(profile, bus, seed=seed, record=record)
         if watch is not None:
             app.supervisor.observers.append(lambda: watch(app))
         self._geometry = profile.vehicle
+        self._limits = app.profile.limits
         self._tell = tell
 
     async def run(self, figures: tuple[Figure, ...]) -> list[FigureResult]:
@@ -131,9 +134,21 @@ class Demo:
         await self.app.start()
         try:
             await self._boot()
-            return [await self._drive(figure) for figure in figures]
+            return [await self._drive(self._permitted(figure)) for figure in figures]
         finally:
             await self.app.close()
+
+    def _permitted(self, figure: Figure) -> Figure:
+        """The figure at the speed that this wire allows, over the same way."""
+        rear, front = math.radians(figure.rear_deg), math.radians(figure.front_deg)
+        fastest = max(abs(speed) for speed in solve_turning(self._geometry, rear, front, 1.0).roll_speed_m_s)
+        top = min(self._limits.speed_m_s, self._limits.wheel_speed_m_s / fastest)
+        if abs(figure.speed_m_s) <= top:
+            return figure
+        speed = math.copysign(math.floor(100 * top) / 100, figure.speed_m_s)
+        duration = figure.speed_m_s * figure.duration_s / speed
+        self._tell(f"figure {figure.identity} at {abs(speed):g} m/s: the cycle over this wire permits no more")
+        return replace(figure, speed_m_s=speed, duration_s=duration)
 
     async def _boot(self) -> None:
         self._tell("booting: four drives and two encoders on a simulated CANopen bus")
@@ -176,7 +191,7 @@ class Demo:
             app.service.close_lease(lease)
         frames, cycles, late, busy_s = (now - then for now, then in zip(self._counts(), before, strict=True))
         duration_s = loop.time() - begin_s
-        numbers = {
+        numbers: dict[str, Any] = {
             "figure": figure.identity,
             "move": figure.move,
             "commanded": self._commanded(figure),
@@ -187,6 +202,10 @@ class Demo:
             "cycles": cycles,
             "late_cycles": late,
         }
+        line = app.bus.details()
+        if line:
+            numbers["line"] = {"cycle_hz": round(cycles / duration_s, 2), **line}
+            self._tell(_line_words(numbers["line"]))
         return FigureResult(figure, numbers, track, self._centre_of_rotation(figure))
 
     def _counts(self) -> tuple[int, int, int, float]:
@@ -251,6 +270,13 @@ class Demo:
             "max_slip_angle_deg": round(math.degrees(slip_angle), 3),
             "duration_s": round(duration_s, 3),
         }
+
+
+def _line_words(line: dict[str, Any]) -> str:
+    return (
+        f"serial line at {line['baud']} baud: {line['cycle_hz']:g} cycles a second, "
+        f"busy {line['line_utilisation']:.0%}, idle on our side {line['own_idle_share']:.1%}"
+    )
 
 
 def steady_rows(track: Track) -> list[int]:

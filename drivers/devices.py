@@ -13,7 +13,8 @@ from drivers.contract import Brake, Drive, NodeState, SteeringEncoder
 from drivers.encoder.encoder import Cia406Encoder
 from drivers.epos.brake import EposBrake
 from drivers.epos.drive import EposDrive
-from profiles.schema import Profile
+from drivers.epos.gateway_drive import GatewayDrive
+from profiles.schema import DriveConfig, Profile
 
 LOGGER = logging.getLogger("canhelm")
 
@@ -31,7 +32,7 @@ class Devices:
     """
 
     def __init__(self, master: Master, profile: Profile) -> None:
-        drives = {name: EposDrive(master, name, config) for name, config in profile.drives.items()}
+        drives = {name: _drive(master, name, config) for name, config in profile.drives.items()}
         encoders = {name: Cia406Encoder(master, name, config) for name, config in profile.encoders.items()}
         self.drives: dict[str, Drive] = dict(drives)
         self.encoders: dict[str, SteeringEncoder] = dict(encoders)
@@ -67,6 +68,12 @@ class Devices:
                 await _as_far_as_possible(device.before_close)
         for boot in self._boots:
             await boot.close()
+
+
+def _drive(master: Master, name: str, config: DriveConfig) -> EposDrive:
+    if config.mode == "expiring_position":
+        return GatewayDrive(master, name, config)
+    return EposDrive(master, name, config)
 
 
 async def _as_far_as_possible(closing: Callable[[], Awaitable[None]]) -> None:

@@ -46,6 +46,10 @@ class Network(Part, frozen=True, kw_only=True):
     """Time one attempt to configure a node may take before it is started over."""
     sdo_timeout_s: Positive = 0.25
     """Time a node has to answer one SDO request."""
+    synchronous: bool = True
+    """PDOs go with SYNC; without it targets count at once and readings come on request (the RS-232 gateway does that)."""
+    gateway: str | None = None
+    """Name of the drive that the RS-232 line is plugged into; None: the first one. Only used over RS-232."""
 
 
 class Motor(Part, frozen=True, kw_only=True):
@@ -102,7 +106,7 @@ class DriveConfig(Part, frozen=True, kw_only=True):
     wheel_radius_m: Positive
     direction: Literal[1, -1] = 1
     """1: positive motor speed rolls the wheel forward; -1: the motor is mounted mirrored."""
-    mode: Literal["profile_velocity", "velocity"] = "profile_velocity"
+    mode: Literal["profile_velocity", "velocity", "expiring_position"] = "profile_velocity"
     """Mode of operation for driving: 3 (object 0x60FF) or -2 (object 0x206B)."""
     max_speed_m_s: Positive
     """Limit of the wheel's speed, enforced before encoding and written to the drive where it has an object for it."""

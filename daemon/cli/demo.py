@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import importlib.util
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -26,6 +25,7 @@ def demo(
     seed: int = 0,
     out: Path | None = None,
     profile: str = "max2d",
+    bus: str = "simulated",
     json: Json = None,
 ) -> int:
     """Boot a simulated MAX2D and drive the manoeuvres that its designers published.
@@ -38,9 +38,10 @@ def demo(
         seed: Seed of everything random in the simulated network.
         out: Folder for pictures and the candump log.
         profile: A robot with paired steering and simulation data.
+        bus: `simulated`, or `rs232` (`rs232@38400`): the same robot behind the serial line of one of its drives.
     """
     from daemon.demo import FIGURES, Demo
-    from daemon.runtime.clock import run_virtual
+    from daemon.runtime.clock import run_precise, run_virtual
     from profiles.loader import load
 
     figures = tuple(entry for entry in FIGURES if figure in (None, entry.identity))
@@ -48,14 +49,18 @@ def demo(
         have = ", ".join(entry.identity for entry in FIGURES)
         raise UsageError(f"no figure {figure!r}", remedy=f"one of {have}")
     robot = load(profile).profile
+    if bus.partition("@")[0] not in ("simulated", "rs232"):
+        raise UsageError(
+            f"the demo simulates its network, on {bus!r} it cannot", remedy="--bus simulated or --bus rs232"
+        )
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
     with DemoView(every=100 if virtual_time else 10) as view:
 
         async def drive() -> list[FigureResult]:
-            return await Demo(robot, seed, out, view.tell, view.watch).run(figures)
+            return await Demo(robot, seed, out, view.tell, view.watch, bus).run(figures)
 
-        results = run_virtual(drive()) if virtual_time else asyncio.run(drive())
+        results = run_virtual(drive()) if virtual_time else run_precise(drive())
     show([result.numbers for result in results], lambda _: _table(results), json)
     if out is not None:
         _draw(results, robot.vehicle, out)

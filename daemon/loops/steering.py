@@ -18,8 +18,11 @@ REST_SPEED_M_S: Final = 0.005
 """A wheel that is slower counts as at rest (a few counts of its encoder per cycle)."""
 GAIN_1_S: Final = 6.0
 """Of the final approach; with three cycles of delay at 100 Hz well inside 1/e, so that nothing overshoots."""
+GAIN_CYCLES: Final = 0.06
+"""Largest gain times cycle: the same distance from overshoot at slower cycles."""
 SETTLE_TIME_S: Final = 0.05
 CREEP_TIME_S: Final = 0.1
+CREEP_CYCLES: Final = 8
 """The slowest turning covers one tolerance in this time; slower, dry friction would hold the pair."""
 PROGRESS_TIME_S: Final = 4.0
 """Time in which a pair has to come nearer to its target; soft speed regulators need long against dry friction."""
@@ -95,7 +98,7 @@ class PairSteering:
         if self._phase is not SteeringPhase.FAILED:
             self._watch(error, dt)
         self._advance(error, wheel_speed_m_s, dt)
-        self._speed_m_s = ramp(self._speed_m_s, self._wanted(error), self._acceleration_m_s2, dt)
+        self._speed_m_s = ramp(self._speed_m_s, self._wanted(error, dt), self._acceleration_m_s2, dt)
         return SteeringRecord(self._phase, error, self._speed_m_s, self._failure)
 
     def _retarget(self, target_rad: float) -> None:
@@ -134,8 +137,10 @@ class PairSteering:
             near = abs(error) <= self._tolerance_rad
             self._phase = SteeringPhase.DONE if near else SteeringPhase.TURNING
 
-    def _wanted(self, error: float) -> float:
+    def _wanted(self, error: float, dt: float) -> float:
         if self._phase is not SteeringPhase.TURNING:
             return 0.0
-        speed = approach_speed(self._offset_m * abs(error), GAIN_1_S, self._acceleration_m_s2 / 2)
-        return math.copysign(min(max(speed, self._creep_m_s), self._max_speed_m_s), error)
+        gain = min(GAIN_1_S, GAIN_CYCLES / dt)
+        speed = approach_speed(self._offset_m * abs(error), gain, self._acceleration_m_s2 / 2)
+        creep = self._creep_m_s * min(1.0, CREEP_TIME_S / (CREEP_CYCLES * dt))
+        return math.copysign(min(max(speed, creep), self._max_speed_m_s), error)

@@ -5,14 +5,25 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 from daemon.runtime.clock import Ticker
 from drivers.canopen.master import Master
 from drivers.contract import NodeState
 from drivers.devices import Devices
 
-READING_SHARE = 0.5
-"""Share of the period that the readings may take before the step runs without those that are missing."""
+
+class Pace(Protocol):
+    """What ticks once a cycle."""
+
+    max_lateness_s: float
+    """Worst delay of a tick behind its time."""
+
+    def start(self) -> None:
+        """Tick from now on, on the running loop."""
+
+    def stop(self) -> None:
+        """Tick no more."""
 
 
 @dataclass(slots=True)
@@ -43,15 +54,27 @@ class Cycle:
         devices: tell of each reading.
         period_s: the cycle's period.
         step: the control step; must not block.
+        pace: makes what ticks, from period and callback.
+        reading_share: share of the period that the readings may take before the step runs without those that are
+            missing.
     """
 
-    def __init__(self, master: Master, devices: Devices, period_s: float, step: Callable[[float, float], None]) -> None:
+    def __init__(
+        self,
+        master: Master,
+        devices: Devices,
+        period_s: float,
+        step: Callable[[float, float], None],
+        pace: Callable[[float, Callable[[], None]], Pace] = Ticker,
+        reading_share: float = 0.5,
+    ) -> None:
         self.counters = CycleCounters()
         self.period_s = period_s
         self._master = master
         self._devices = devices
         self._step = step
-        self._ticker = Ticker(period_s, self._tick)
+        self._reading_s = reading_share * period_s
+        self._ticker = pace(period_s, self._tick)
         self._missing: set[int] = set()
         self._waiting = False
         self._tick_s = 0.0
@@ -79,7 +102,7 @@ class Cycle:
         self._master.sync()
         self._waiting = True
         if self._missing:
-            self._deadline = self._loop.call_at(self._tick_s + READING_SHARE * self.period_s, self._on_deadline)
+            self._deadline = self._loop.call_at(self._tick_s + self._reading_s, self._on_deadline)
         else:
             self._run()
 

@@ -75,6 +75,7 @@ class Service:
             "bit_rate": self._bus.bit_rate,
             "load": round(self._bus.load(), 4),
             **asdict(self._bus.counters),
+            **self._bus.details(),
             **asdict(self._supervisor.master.counters),
         }
 

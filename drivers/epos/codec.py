@@ -16,14 +16,19 @@ TPDO1_BYTES = TPDO1.size
 TARGET_OBJECT = {
     Mode.PROFILE_VELOCITY: OBJECTS["target_velocity"],
     Mode.VELOCITY: OBJECTS["velocity_mode_setting_value"],
+    Mode.PROFILE_POSITION: OBJECTS["target_position"],
 }
-"""Where the target speed of a driving mode is written to, in rpm."""
+"""Where the target of a driving mode is written to: a speed in rpm, or a position in qc."""
 
 RPDO1_MAPS = {mode: (OBJECTS["controlword"], target) for mode, target in TARGET_OBJECT.items()}
 RPDO1 = pdo_struct(RPDO1_MAPS[Mode.PROFILE_VELOCITY])
 RPDO3 = pdo_struct((OBJECTS["controlword"], OBJECTS["mode_of_operation"]))
 
-DRIVING_MODES = {"profile_velocity": Mode.PROFILE_VELOCITY, "velocity": Mode.VELOCITY}
+DRIVING_MODES = {
+    "profile_velocity": Mode.PROFILE_VELOCITY,
+    "velocity": Mode.VELOCITY,
+    "expiring_position": Mode.PROFILE_POSITION,
+}
 """Modes for driving by their name in a profile."""
 
 

@@ -99,7 +99,7 @@ class EposSetup:
         await self._written.write(guarding_plan(self._network))
 
     async def _write_pdos(self) -> None:
-        await self._written.write(pdo_plan(self._config))
+        await self._written.write(pdo_plan(self._config, synchronous=self._network.synchronous))
 
     async def _write_parameters(self) -> None:
         await self._written.write(parameter_plan(self._config))

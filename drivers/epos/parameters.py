@@ -63,14 +63,15 @@ def counts_from_start(entry: ObjectDef) -> bool:
     return entry in _START_UP
 
 
-def pdo_plan(config: DriveConfig) -> Settings:
+def pdo_plan(config: DriveConfig, *, synchronous: bool = True) -> Settings:
     """COB-IDs, transmission types and mappings; unused PDOs too, because at factory settings all belong to node 1."""
     node, rpdo1_map = config.node, RPDO1_MAPS[DRIVING_MODES[config.mode]]
+    cyclic = ON_SYNC if synchronous else AT_ONCE
     return [
-        *rpdo_settings(OBJECTS, 1, node, ON_SYNC, rpdo1_map),
+        *rpdo_settings(OBJECTS, 1, node, cyclic, rpdo1_map),
         *rpdo_settings(OBJECTS, 2, node, AT_ONCE),
         *rpdo_settings(OBJECTS, 3, node, AT_ONCE),
-        *tpdo_settings(OBJECTS, 1, node, ON_SYNC, TPDO1_MAP),
+        *tpdo_settings(OBJECTS, 1, node, cyclic, TPDO1_MAP),
         *tpdo_settings(OBJECTS, 2, node, AT_ONCE),
         *tpdo_settings(OBJECTS, 3, node, AT_ONCE),
     ]
@@ -121,7 +122,8 @@ def expected_settings(config: DriveConfig, network: Network) -> dict[ObjectDef, 
     """The whole configuration that a profile expects of a drive."""
     pulses = (OBJECTS["encoder_pulses_per_turn"], config.encoder_pulses_per_turn)
     mode = (OBJECTS["mode_of_operation"], int(DRIVING_MODES[config.mode]))
-    plans = (pdo_plan(config), parameter_plan(config), start_up_plan(config), guarding_plan(network))
+    pdos = pdo_plan(config, synchronous=network.synchronous)
+    plans = (pdos, parameter_plan(config), start_up_plan(config), guarding_plan(network))
     return dict(setting for plan in plans for setting in plan) | dict((pulses, mode))
 
 

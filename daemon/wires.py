@@ -1,0 +1,118 @@
+"""What a bus SPEC means: the interface, the profile as it can be run over it, and what paces the control cycle."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+from canhelm.errors import UsageError
+from daemon.runtime.clock import Ticker, VirtualTimeLoop
+from daemon.runtime.cycle import Pace
+from daemon.runtime.pace import LinePace
+from drivers.bus.contract import Bus
+from drivers.encoder.objects import OBJECTS as ENCODER_OBJECTS
+from drivers.epos.serial_bus import SerialGatewayBus
+from drivers.epos.serial_conversation import Transport
+from drivers.epos.serial_plan import gateway_of, serial_profile
+from drivers.epos.serial_tty import SerialTty
+from drivers.simulated.bus import SimulatedBus
+from drivers.simulated.network import SimulatedNetwork
+from drivers.simulated.serial import SimulatedSerial
+from drivers.simulated.serial_wire import SerialCable, SerialPty
+from profiles.schema import Profile
+
+DEFAULT_BAUD = 115200
+_RS232 = re.compile(r"rs232(?::(?P<device>[^@]+))?(?:@(?P<baud>\d+))?")
+OnLost = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Wire:
+    """One way to a robot.
+
+    Attributes:
+        bus: the interface for the master.
+        profile: the robot as it can be run over it.
+        network, medium: the simulated network and its CAN bus; None on a real one.
+        cable: the simulated serial cable, where there is one.
+        pace: makes what ticks the control cycle, from period and callback.
+        reading_share: share of a cycle that its readings may take.
+    """
+
+    bus: Bus
+    profile: Profile
+    network: SimulatedNetwork | None = None
+    medium: SimulatedBus | None = None
+    cable: SerialCable | None = None
+    pace: Callable[[float, Callable[[], None]], Pace] = Ticker
+    reading_share: float = 0.5
+
+
+def make_wire(spec: str, profile: Profile, seed: int) -> Wire:
+    """The way to a robot that a SPEC names.
+
+    Args:
+        spec: ``simulated``; ``rs232`` for a simulated drive on a simulated serial line; ``rs232:DEVICE[@BAUD]``; or
+            ``INTERFACE:CHANNEL`` of python-can.
+        profile: the robot.
+        seed: of everything random in a simulated network.
+
+    Raises:
+        UsageError: a SPEC that means nothing.
+    """
+    if spec == "simulated":
+        medium = SimulatedBus(bit_rate=profile.network.bit_rate, name="vcan0")
+        network = SimulatedNetwork(profile, medium, seed)
+        return Wire(medium.port("master"), profile, network, medium)
+    serial = _RS232.fullmatch(spec)
+    if serial is None:
+        from drivers.bus.python_can import open_bus  # here, so that a simulation does not wait for python-can
+
+        return Wire(open_bus(spec, profile.network.bit_rate), profile)
+    baud = int(serial["baud"] or DEFAULT_BAUD)
+    if serial["device"]:
+        return _serial_wire(serial["device"], partial(_open_device, serial["device"], baud), profile, baud)
+    return _simulated_serial(profile, baud, seed)
+
+
+def _simulated_serial(profile: Profile, baud: int, seed: int) -> Wire:
+    medium = SimulatedBus(bit_rate=profile.network.bit_rate, name="vcan0")
+    network = SimulatedNetwork(profile, medium, seed)
+    try:
+        port = SimulatedSerial(network.drives[gateway_of(profile)], baud, seed=seed)
+    except ValueError as error:
+        raise UsageError(str(error), value=baud, remedy="give rs232@115200 or rs232@38400") from None
+    return _serial_wire("rs232", partial(_open_cable, port.cable), profile, baud, network, medium, port.cable)
+
+
+def _serial_wire(
+    name: str,
+    connect: Callable[[OnLost], Transport],
+    profile: Profile,
+    baud: int,
+    network: SimulatedNetwork | None = None,
+    medium: SimulatedBus | None = None,
+    cable: SerialCable | None = None,
+) -> Wire:
+    shrunk = serial_profile(profile, baud)
+    encoders = {encoder.node: ENCODER_OBJECTS for encoder in profile.encoders.values()}
+    gateway = profile.drives[gateway_of(profile)].node
+    bus = SerialGatewayBus(name, connect, baud, profile.network.bit_rate, gateway, encoders)
+    return Wire(bus, shrunk, network, medium, cable, partial(LinePace, bus), reading_share=0.9)
+
+
+def _open_device(device: str, baud: int, on_lost: OnLost) -> Transport:
+    port = SerialTty(device, baud)
+    port.on_lost = on_lost
+    port.open()
+    return port
+
+
+def _open_cable(cable: SerialCable, on_lost: OnLost) -> Transport:
+    """On virtual time the cable itself; in real time a terminal at its end, as a person would plug it in."""
+    if isinstance(asyncio.get_running_loop(), VirtualTimeLoop):
+        return cable
+    return _open_device(SerialPty(cable).device, cable.baud, on_lost)
