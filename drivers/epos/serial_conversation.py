@@ -130,10 +130,12 @@ class Conversation:
         self._disturbed = False
         self._unheard = 0
         self._our_turn_s = math.inf
-        self.attach(transport)
+        self._transport = transport
+        transport.host = self.receive
 
     def attach(self, transport: Transport) -> None:
-        """Speak over another transport from now on."""
+        """Speak over another transport from now on; the one before is not listened to any more."""
+        self._transport.host = None
         self._transport = transport
         transport.host = self.receive
 

@@ -176,6 +176,28 @@ async def test_what_is_no_serial_device_is_told(device: str) -> None:
 
 
 @pytest.mark.real_time
+async def test_a_device_that_another_program_uses_is_refused(opened: Callable[[], SerialTty]) -> None:
+    opened()
+    with pytest.raises(BusOff, match="another program uses it"):
+        opened()
+
+
+@pytest.mark.real_time
+async def test_an_adapter_is_told_to_hand_over_each_byte_at_once(
+    pty: Pty, opened: Callable[[], SerialTty], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    set_up: list[bytes] = []
+
+    def ioctl(_: int, request: int, settings: bytearray) -> None:
+        if request == 0x541F:  # TIOCSSERIAL
+            set_up.append(bytes(settings[16:20]))
+
+    monkeypatch.setattr("drivers.epos.serial_tty.fcntl.ioctl", ioctl)
+    opened()
+    assert set_up == [(1 << 13).to_bytes(4, "little")]
+
+
+@pytest.mark.real_time
 async def test_a_closed_device_swallows_what_is_written(opened: Callable[[], SerialTty]) -> None:
     serial = opened()
     serial.close()
