@@ -142,6 +142,8 @@ def _object(index: int, entries: list[ObjectDef], values: Mapping[Address, int],
     if [entry.sub for entry in entries] == [0]:
         return [_section(f"{index:04X}", _variable(entries[0], values, node))]
     name = entries[0].name.removesuffix("_highest_sub_index")
+    if name == entries[0].name:
+        name = f"object_{index:04X}"
     record = {"ParameterName": name, "ObjectType": f"0x{RECORD:X}", "SubNumber": len(entries)}
     subs = (_section(f"{index:04X}sub{entry.sub:X}", _variable(entry, values, node)) for entry in entries)
     return [_section(f"{index:04X}", record), *subs]

@@ -211,6 +211,7 @@ class _Reader:
     # --- objects -------------------------------------------------------------------------------------------------
 
     def mended(self) -> EdsText:
+        self._general.setdefault("DeviceInfo", Section("DeviceInfo", 1))
         for section in self._general.values():
             self._mend_general(section)
         for (index, sub), section in list(self._objects.items()):
@@ -293,7 +294,7 @@ class _Reader:
         if value is None:
             self._leave_out(section, key, "is no whole number")
             return
-        if signed and value >= 1 << (bits - 1):
+        if signed and "x" in text.lower() and value >> (bits - 1) == 1:
             value -= 1 << bits  # a negative number in the two's complement of its type
         low = -(1 << (bits - 1)) if signed else 0
         if not low <= value < low + (1 << bits):

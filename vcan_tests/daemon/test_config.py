@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from canhelm.errors import Interlock, Refused, UsageError
+from canhelm.errors import Aborted, Interlock, Refused, UsageError
 from drivers.epos.objects import OBJECTS
 from drivers.simulated.epos import SimulatedEpos
 from vcan_tests.robot import Robot, running_robot
@@ -186,3 +186,17 @@ async def test_a_robot_drives_on_after_its_settings_were_changed() -> None:
         await until_idle(robot)
         driven = await robot.call("drive.parallel", angle_deg=0.0, speed_m_s=0.3, duration_s=1.0)
         assert driven["motion"]
+
+
+async def test_reading_an_object_that_the_firmware_lacks_says_so() -> None:
+    async with running_robot() as robot:
+        with pytest.raises(Aborted, match=r"does not have 0x6067 \(position_window\): it came with later firmware"):
+            await robot.call("sdo.read", node=1, object="position_window")
+        with pytest.raises(Aborted, match="refused access"):
+            await robot.call("sdo.read", node=1, object="0x2025")
+
+
+async def test_an_object_is_read_with_type_and_unit() -> None:
+    async with running_robot() as robot:
+        found = await robot.call("sdo.read", node=1, object="0x6410/5")
+        assert (found["value"], found["type"], found["unit"]) == (40, "u16", "100 ms")
