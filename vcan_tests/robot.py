@@ -97,6 +97,7 @@ class Robot:
 async def running_robot(
     profile: Profile | None = None,
     *,
+    bus: str = "simulated",
     seed: int = 1,
     record: Path | None = None,
     powered: bool = True,
@@ -106,12 +107,13 @@ async def running_robot(
     """A robot that has booted; asserts health at its end unless errors are expected.
 
     Args:
+        bus: the SPEC of the wire.
         booted: wait until it is idle.
         expect_errors: the test breaks something; logged errors and faults are its subject.
     """
     handler = _Collector()
     logging.getLogger().addHandler(handler)
-    app = App(profile or load("max2d").profile, seed=seed, record=record, powered=powered)
+    app = App(profile or load("max2d").profile, bus, seed=seed, record=record, powered=powered)
     robot = Robot(app)
     before = asyncio.all_tasks()
     await app.start()

@@ -254,9 +254,10 @@ class SerialGatewayBus(Bus):
 
     def _ask(self, node: int, request: bytes, can_id: int, deadline_s: float) -> None:
         def take(data: bytes) -> None:
-            self._receive(can_id, data)
             if can_id & 0x780 == 0x180:
-                self._look_for_fault(node, data[0])
+                self._hand_up_drive(node, data)
+            else:
+                self._receive(can_id, data)
 
         self._asked.add(node)
         self._submit(request, node, deadline_s, take, then=lambda: self._asked.discard(node))
@@ -269,8 +270,7 @@ class SerialGatewayBus(Bus):
             self._current = data[:2]
 
         def position(data: bytes) -> None:
-            self._receive(0x180 + self.gateway, self._statusword + data + self._current)
-            self._look_for_fault(self.gateway, self._statusword[0])
+            self._hand_up_drive(self.gateway, self._statusword + data + self._current)
 
         self._asked.add(self.gateway)
         self._read_own("statusword", status, deadline_s)
@@ -281,20 +281,25 @@ class SerialGatewayBus(Bus):
     def _read_own(self, name: str, take: OnData, deadline_s: float, then: Callable[[], None] | None = None) -> None:
         self._submit(make_read_object(self.gateway, EPOS[name].index, 0), self.gateway, deadline_s, take, then=then)
 
-    def _look_for_fault(self, node: int, statusword_low: int) -> None:
-        """Ask a drive that has just gone into fault for its last error; emergency messages are not forwarded."""
-        if not statusword_low & FAULT_BIT:
+    def _hand_up_drive(self, node: int, tpdo1: bytes) -> None:
+        """Hand a drive's reading up; when it has just gone into fault, after the error that it recorded.
+
+        Emergency messages are not forwarded, so the error is read and goes up as the message it would have been.
+        """
+        if not tpdo1[0] & FAULT_BIT:
             self._faulty.discard(node)
-            return
-        if node in self._faulty:
+        if not tpdo1[0] & FAULT_BIT or node in self._faulty:
+            self._receive(0x180 + node, tpdo1)
             return
         self._faulty.add(node)
-
-        def take(data: bytes) -> None:
-            self._receive(0x080 + node, data[:2] + b"\0" * 6)
-
         entry = EPOS["error_history_entry_1"]
-        self._submit(make_read_object(node, entry.index, entry.sub), node, math.inf, take)
+        self._submit(
+            make_read_object(node, entry.index, entry.sub),
+            node,
+            math.inf,
+            lambda data: self._receive(0x080 + node, data[:2] + b"\0" * 6),
+            then=lambda: self._receive(0x180 + node, tpdo1),
+        )
 
     # --- the line ------------------------------------------------------------------------------------------------
 
@@ -314,8 +319,6 @@ class SerialGatewayBus(Bus):
 
         def done(result: Answer | CanhelmError) -> None:
             self._under_way -= 1
-            if then is not None:
-                then()
             if isinstance(result, Answer) and not result.error:
                 self._spoke_s[node] = asyncio.get_running_loop().time()
                 if take is not None:
@@ -324,6 +327,8 @@ class SerialGatewayBus(Bus):
                 self._on_silence(node)
             elif not isinstance(result, BusOff):
                 self.counters.dropped_stale += 1
+            if then is not None:
+                then()
             if not self._under_way and self.on_idle is not None:
                 self.on_idle()
 

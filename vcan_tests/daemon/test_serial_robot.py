@@ -1,0 +1,108 @@
+"""A whole simulated MAX2D behind the serial line of one of its drives, on virtual time."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from typing import Any
+
+import pytest
+
+from canhelm.errors import CanhelmError
+from drivers.epos.gateway_drive import stopping_way_m
+from drivers.epos.serial_plan import plan, serial_limits, serial_speed_m_s
+from profiles.loader import load
+from vcan_tests.robot import Robot, running_robot
+
+MAX2D = load("max2d").profile
+
+
+async def test_it_boots_and_steers_to_within_a_degree() -> None:
+    async with running_robot(bus="rs232") as robot:
+        steered = await robot.call("steer", pair="front", angle_deg=30.0)
+        assert steered["steering_error_deg"] <= 1.0
+        assert math.degrees(robot.network.world.heading_rad("front")) == pytest.approx(30.0, abs=1.0)
+
+
+async def test_figure_4_16_has_its_radius_within_eight_percent() -> None:
+    async with running_robot(bus="rs232") as robot:
+        speed = robot.app.profile.limits.speed_m_s
+        start = robot.network.world.pose
+        await robot.call(
+            "drive.turn", rear_deg=math.degrees(0.15), front_deg=math.degrees(-0.3), speed_m_s=speed, duration_s=3.0
+        )
+        x, y, yaw = robot.network.world.pose
+        chord = math.hypot(x - start[0], y - start[1])
+        assert chord / (2 * abs(math.sin((yaw - start[2]) / 2))) == pytest.approx(1.0027, rel=0.08)
+
+
+@pytest.mark.parametrize(("baud", "slowest_hz"), [(115200, 15.0), (38400, 7.0)])
+async def test_the_line_gives_at_least_the_planned_rate(baud: int, slowest_hz: float) -> None:
+    async with running_robot(bus=f"rs232@{baud}") as robot:
+        planned_hz = plan(MAX2D, baud).cycle_hz
+        assert planned_hz > slowest_hz
+        before, begin = robot.app.cycle.counters.cycles, asyncio.get_running_loop().time()
+        await robot.call("drive.parallel", angle_deg=0.0, speed_m_s=0.3, duration_s=4.0)
+        cycles = robot.app.cycle.counters.cycles - before
+        assert cycles / (asyncio.get_running_loop().time() - begin) > planned_hz
+
+
+async def _at_speed(robot: Robot, speed_m_s: float) -> asyncio.Task[dict[str, Any]]:
+    driving = asyncio.create_task(robot.call("drive.parallel", angle_deg=0.0, speed_m_s=speed_m_s, duration_s=20.0))
+    await robot.until(lambda: robot.speed_m_s > 0.95 * speed_m_s)
+    return driving
+
+
+async def test_a_pulled_cable_stops_every_wheel_within_the_stated_way() -> None:
+    async with running_robot(bus="rs232", expect_errors=True) as robot:
+        driving = await _at_speed(robot, 0.3)
+        network, drive = robot.app.profile.network, MAX2D.drives["rear_left"]
+        x, _, _ = robot.network.world.pose
+        assert robot.app.wire.cable is not None
+        robot.app.wire.cable.pulled = True
+        begin = asyncio.get_running_loop().time()
+        life_s = network.guard_time_ms * network.life_time_factor / 1e3
+        await asyncio.sleep(life_s + 0.3 / drive.quick_stop_m_s2 + 0.2)
+        assert robot.fastest_wheel_m_s < 0.01
+        way = robot.network.world.pose[0] - x
+        guarded = 0.3 * life_s + 0.3**2 / (2 * drive.quick_stop_m_s2)
+        own = stopping_way_m(0.3, 1.0 / network.cycle_hz, drive.acceleration_m_s2)
+        assert way < max(guarded, own) + 0.02
+        assert asyncio.get_running_loop().time() - begin < 1.5
+        with pytest.raises(CanhelmError):
+            await driving
+
+
+async def test_a_drive_without_power_is_left_out_and_stops_the_vehicle() -> None:
+    async with running_robot(bus="rs232", expect_errors=True) as robot:
+        driving = await _at_speed(robot, 0.3)
+        robot.network.power_off(3)
+        await robot.until(lambda: robot.state == "fault", 2.0)
+        await robot.until(lambda: robot.speed_m_s < 0.01, 3.0)
+        with pytest.raises(CanhelmError, match="front_left"):
+            await driving
+        robot.network.power_on(3)
+        await robot.until(lambda: all(d.node_state == "ready" for d in robot.app.devices.by_node.values()), 20.0)
+        assert (await robot.call("reset"))["state"] == "idle"
+        await robot.call("drive.parallel", angle_deg=0.0, speed_m_s=0.2, duration_s=1.0)
+
+
+async def test_a_fault_of_the_drive_on_the_line_is_told_by_its_code() -> None:
+    async with running_robot(bus="rs232", expect_errors=True) as robot:
+        driving = await _at_speed(robot, 0.3)
+        robot.network.drives["rear_right"].trigger_fault(0x4210)
+        with pytest.raises(CanhelmError, match="temperature"):
+            await driving
+
+
+def test_slower_sensing_means_a_lower_speed_with_the_same_way_to_rest() -> None:
+    speed = serial_speed_m_s(1.2, 2.0, 0.01, 0.06)
+    way = 1.2 * 0.02 + 1.2**2 / 4.0
+    assert speed < 1.2
+    assert speed * 0.18 + speed**2 / 4.0 == pytest.approx(way)
+
+
+def test_the_same_rate_leaves_the_limits_as_they_are() -> None:
+    shrunk = serial_limits(MAX2D.limits, 2.0, 0.01, 0.005)
+    assert shrunk.speed_m_s == MAX2D.limits.speed_m_s
+    assert shrunk.steering_rim_speed_m_s == MAX2D.limits.steering_rim_speed_m_s
