@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 _NUMBER = re.compile(r"(?P<sign>[+-]?)(?:0[xX](?P<hex>[0-9a-fA-F]+)|(?P<octal>0[0-7]*)|(?P<decimal>[1-9][0-9]*))")
 _REAL = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
-_HEX_PAIRS = re.compile(r"[0-9a-fA-F]{2}(?:[ \t]*[0-9a-fA-F]{2})*")
 _QUOTED = re.compile(r'"((?:[^"]|"")+)"')
 _WORD = re.compile(r'[^" \t]+')
 
@@ -89,7 +88,10 @@ def _hex_text(data: bytes) -> str:
 
 
 def _hex_bytes(text: str) -> bytes | None:
-    return bytes.fromhex(text) if _HEX_PAIRS.fullmatch(text) else None
+    try:
+        return bytes.fromhex(text) or None
+    except ValueError:
+        return None
 
 
 def _string_text(data: bytes) -> str | None:
