@@ -223,7 +223,7 @@ class EposDrive(CanopenDevice):
             )
 
     def quick_stop(self) -> None:
-        """Command the quick stop by RPDO3 and, RPDO1; a drive that is off is just kept from being enabled."""
+        """Command the quick stop by RPDO3 and RPDO1; a drive that is off is just kept from being enabled."""
         self._interrupt(Refused(f"{self.who} was stopped in the meantime", node=self.node, remedy="enable it again"))
         self._drop_target()
         self._controlword = int(Command.QUICK_STOP)
