@@ -55,10 +55,8 @@ class LssCommands:
         """
         try:
             return await self._handlers[name](numbers)
-        except NodeAbsent as error:
+        except (NodeAbsent, DeviceFault) as error:
             raise GatewayError(ErrorNumber.TIME_OUT, error.message) from None
-        except DeviceFault as error:
-            raise GatewayError(ErrorNumber.LSS_MEDIA, error.message) from None
 
     async def _switch_global(self, numbers: tuple[int, ...]) -> str:
         self._lss.switch_global(bool(numbers[0]))
@@ -131,4 +129,6 @@ async def _confirmed(service: Awaitable[None], refused: ErrorNumber) -> str:
     except Refused as error:
         number = ErrorNumber.LSS_VENDOR if error.value == _VENDOR_ERROR else refused
         raise GatewayError(number, error.message) from None
+    except DeviceFault as error:
+        raise GatewayError(ErrorNumber.LSS_MEDIA, error.message) from None
     return "OK"

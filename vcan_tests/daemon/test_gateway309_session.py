@@ -215,6 +215,22 @@ async def test_a_search_by_pattern_is_not_supported() -> None:
         assert answer.startswith("[1] ERROR:100")
 
 
+REFUSALS = [(1, 0, 504), (0xFF, 7, 501), (2, 0, 505)]
+
+
+@pytest.mark.parametrize(("code", "makers_code", "number"), REFUSALS)
+async def test_why_a_device_does_not_store_is_told_by_the_number(
+    code: int, makers_code: int, number: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with running_robot(booted=False, powered=False) as robot:
+        encoder = without_node_id(robot)
+        monkeypatch.setitem(encoder.lss._services, 0x17, lambda request: (code, makers_code))
+        await power_on(robot)
+        session = Session(robot.app.supervisor)
+        await ask(session, "[1] lss_switch_glob 1")
+        assert (await ask(session, "[2] lss_store")).startswith(f"[2] ERROR:{number} #")
+
+
 # -- the rest ---------------------------------------------------------------------------------------------------------
 
 
