@@ -34,11 +34,12 @@ Done = Callable[[Answer | CanhelmError], None]
 class _Job:
     """One request on its way; ``on_done`` is None when nobody waits for it any more."""
 
-    __slots__ = ("on_done", "request", "timer", "tries", "urgent")
+    __slots__ = ("deadline_s", "on_done", "request", "timer", "tries", "urgent")
 
-    def __init__(self, request: bytes, on_done: Done, urgent: bool) -> None:
+    def __init__(self, request: bytes, on_done: Done, deadline_s: float, urgent: bool) -> None:
         self.request = request
         self.on_done: Done | None = on_done
+        self.deadline_s = deadline_s
         self.urgent = urgent
         self.tries = 0
         self.timer: asyncio.TimerHandle | None = None
@@ -142,11 +143,10 @@ class SerialLine:
             deadline_s: loop time after which nobody wants the answer any more.
             urgent: goes before all that are not.
         """
+        job = _Job(request, on_done, deadline_s, urgent)
         if self.down is not None or len(self._urgent) + len(self._others) >= QUEUE_DEPTH:
-            self.failures += 1
-            self._loop.call_soon(on_done, self.down or serial_errors.queue_full(request, self.name))
+            self._fail(job, self.down or serial_errors.queue_full(request, self.name))
             return
-        job = _Job(request, on_done, urgent)
         if deadline_s < math.inf:
             job.timer = self._loop.call_at(deadline_s, self._expire, job)
         self._queue_of(job).append(job)
@@ -157,11 +157,18 @@ class SerialLine:
         return self._urgent if job.urgent else self._others
 
     def _next(self) -> None:
+        """Send what comes first; what is too late by now is not sent, even if its timer is late, too."""
+        now_s = self._loop.time()
         queue = self._urgent or self._others
-        if queue:
-            self._job = job = queue.popleft()
-            job.tries += 1
-            self._talk.begin(job.request)
+        while queue and self._job is None:
+            job = queue.popleft()
+            if job.deadline_s > now_s:
+                self._job = job
+                job.tries += 1
+                self._talk.begin(job.request)
+            else:
+                self._fail(job, serial_errors.unsent(job.request, self.name))
+            queue = self._urgent or self._others
 
     def _expire(self, job: _Job) -> None:
         """Nobody waits any more; what is on the line goes on to its end."""
@@ -201,18 +208,26 @@ class SerialLine:
             self._fail(job, serial_errors.lost(job.request, self.name))
 
     def _fail(self, job: _Job, error: CanhelmError) -> None:
-        self.failures += job.on_done is not None
-        self._report(job, error)
+        """Tell on the loop's next turn: failures come in the middle of something else."""
+        on_done = self._release(job)
+        if on_done is not None:
+            self.failures += 1
+            self._loop.call_soon(on_done, error)
 
-    def _report(self, job: _Job, result: Answer | CanhelmError) -> None:
+    def _report(self, job: _Job, answer: Answer) -> None:
+        on_done = self._release(job)
+        if on_done is not None:
+            on_done(answer)
+        else:
+            self.late_answers += 1
+
+    def _release(self, job: _Job) -> Done | None:
+        """Who waits for this request; nobody does from now on."""
         if job.timer is not None:
             job.timer.cancel()
             job.timer = None
         on_done, job.on_done = job.on_done, None
-        if on_done is not None:
-            on_done(result)
-        elif isinstance(result, Answer):
-            self.late_answers += 1
+        return on_done
 
     # --- the device below ----------------------------------------------------------------------------------------
 

@@ -29,9 +29,11 @@ class Wire:
     def __init__(self, baud: int, deliver: Callable[[bytes, float], None], share: float, dice: Random) -> None:
         self._byte_s, self._deliver, self._share, self._dice = 10 / baud, deliver, share, dice
         self._free_s = 0.0
+        self.sent = 0
         self.spoiled = 0
 
     def send(self, data: bytes) -> None:
+        self.sent += len(data)
         for byte in data:
             self._send_byte(byte)
 

@@ -147,6 +147,24 @@ async def test_a_request_whose_turn_does_not_come_is_never_sent() -> None:
     assert len(drive.carried_out) == 1
 
 
+async def test_a_request_that_comes_after_its_deadline_is_never_sent() -> None:
+    drive = Drive()
+    with pytest.raises(Timeout, match="was not sent"):
+        await a_line(drive).request(CONTROLWORD, timeout_s=0.0)
+    assert drive.to_drive.sent == 0
+
+
+async def test_no_callback_comes_from_within_the_call() -> None:
+    line = a_line(Drive())
+    results: list[Answer | CanhelmError] = []
+    line.submit(STATUSWORD, results.append, now())
+    line.lose("Input/output error")
+    line.submit(STATUSWORD, results.append)
+    assert results == []
+    await asyncio.sleep(0)
+    assert [type(result) for result in results] == [Timeout, BusOff]
+
+
 async def test_a_full_queue_refuses_more() -> None:
     line = a_line(Drive())
     results: list[Answer | CanhelmError] = []
