@@ -291,6 +291,57 @@ _NETWORK = (
     ),
 )
 
+_CONFIRM = Param("confirm", "boolean", "must be true: somebody has agreed", default=False)
+_DEVICE = Param("device", "value", "node id, name, or identity as VENDOR:PRODUCT:REVISION:SERIAL")
+
+_NODES = (
+    Method(
+        "nodes.scan",
+        "Who is on the bus: asks node ids and watches for two nodes with one id and for a wrong bit rate.",
+        (
+            Param("first", "integer", "first node id to ask", default=1, minimum=1, maximum=127),
+            Param("last", "integer", "last node id to ask", default=127, minimum=1, maximum=127),
+        ),
+        "nodes, remarks",
+        Role.WATCH,
+    ),
+    Method(
+        "nodes.store",
+        "Let a node keep its parameters (0x1010); refused while anything is enabled.",
+        (_NODE, _CONFIRM),
+        "node, object, note",
+        Role.CONFIGURE,
+    ),
+    Method(
+        "nodes.restore",
+        "Give a node its factory values back from its next restart on (0x1011); refused while anything is enabled.",
+        (_NODE, _CONFIRM),
+        "node, object, note",
+        Role.CONFIGURE,
+    ),
+    Method(
+        "lss.find",
+        "Find one LSS device without a node id by fast scan.",
+        (),
+        "identity, vendor, product, revision, serial",
+        Role.CONFIGURE,
+    ),
+    Method(
+        "lss.set_node_id",
+        "Store another node id in an LSS device, and let it count at once; refused while anything is enabled.",
+        (_DEVICE, Param("node_id", "integer", "the new node id", minimum=1, maximum=127), _CONFIRM),
+        "device, node, note",
+        Role.CONFIGURE,
+    ),
+    Method(
+        "lss.set_bit_rate",
+        "Store another bit rate in an LSS device for its next power-up; refused while anything is enabled.",
+        (_DEVICE, Param("bit_rate", "integer", "bit rate", "bit/s", minimum=10_000, maximum=1_000_000), _CONFIRM),
+        "device, bit_rate, note",
+        Role.CONFIGURE,
+    ),
+)
+
 _DRY_RUN = Param("dry_run", "boolean", "only tell what would be written", default=False)
 _PRODUCT = Param("product_code", "integer", "of the drive that the settings are of (object 0x1018/2)", default=None)
 _SETTINGS = Param("values", "values", "settings by object, as 0x6083 or 0x2078/2; those of the profile where left out",
@@ -330,7 +381,7 @@ _CONFIG = (
 )
 
 METHODS: dict[str, Method] = {
-    method.name: method for method in (*_TALK, *_WHOLE, *_MOTOR, *_VEHICLE, *_NETWORK, *_CONFIG)
+    method.name: method for method in (*_TALK, *_WHOLE, *_MOTOR, *_VEHICLE, *_NETWORK, *_NODES, *_CONFIG)
 }
 
 NOTIFICATIONS = {

@@ -46,6 +46,7 @@ COMMANDS: dict[Group, dict[str, str]] = {
         "explain": "daemon.cli.explain:explain",
     },
     NETWORK: {
+        "nodes": "daemon.cli.nodes:app",
         "nmt": "daemon.cli.nmt:app",
         "sdo": "daemon.cli.sdo:app",
         "config": "daemon.cli.config:app",

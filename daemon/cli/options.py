@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -34,6 +35,14 @@ class Options:
 
 
 DEFAULT = Options()
+
+
+def agreed(question: str) -> bool:
+    """Whether the person at the terminal says yes. Raises UsageError where nobody is there."""
+    if not sys.stdin.isatty():
+        raise UsageError("nobody is there to agree", remedy="say --yes")
+    print(f"{question} [y/N] ", end="", file=sys.stderr, flush=True)
+    return sys.stdin.readline().strip().lower() in ("y", "yes")
 
 
 def node_of(text: str) -> int | str:

@@ -12,6 +12,7 @@ from daemon.runtime.handlers import Handler, Params, holder, run_motion
 from daemon.runtime.motions import Motion
 from daemon.runtime.motor_commands import MotorCommands
 from daemon.runtime.network_commands import NetworkCommands
+from daemon.runtime.node_commands import NodeCommands
 from daemon.runtime.supervisor import Supervisor
 
 
@@ -36,6 +37,7 @@ class Commands:
             **MotorCommands(supervisor).handlers,
             **BrakeCommands(supervisor).handlers,
             **NetworkCommands(supervisor).handlers,
+            **NodeCommands(supervisor).handlers,
             **ConfigCommands(supervisor).handlers,
         }
         for method in supervisor.vehicle.methods:
