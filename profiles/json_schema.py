@@ -15,7 +15,12 @@ import msgspec
 from profiles import schema
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-EXTENDS = {"type": "string", "description": "Profile file that this mapping is laid over, as devices/ec40."}
+_NAME = {"type": "string"}
+EXTENDS = {
+    "anyOf": [_NAME, {"type": "array", "items": _NAME}],
+    "description": "What this mapping is laid over: a profile file (devices/ec40), a part of the catalogue "
+    "(catalogue/268214), or a list of them, a later one over an earlier one.",
+}
 
 
 def json_schema() -> dict[str, Any]:

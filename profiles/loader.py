@@ -6,13 +6,14 @@ import difflib
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 from pathlib import Path
 
 import msgspec
 
 from canhelm.errors import ConfigError
-from profiles import checks, feasibility
-from profiles.provenance import Mapping, Mistake, Node, Place, Reader, Scalar, leaves, merge
+from profiles import catalogue, checks, feasibility
+from profiles.provenance import Listing, Mapping, Mistake, Node, Place, Reader, Scalar, leaves, merge
 from profiles.schema import Profile
 from profiles.shape import Shape
 
@@ -139,14 +140,23 @@ class Assembly:
         own = Mapping(entries, node.place, node.key_places, node.complete)
         if "extends" not in node.entries:
             return own
-        base = self._base(node.entries["extends"], path)
+        base = self._bases(node.entries["extends"], path)
         return merge(base, own) if base else Mapping(entries, own.place, own.key_places, complete=False)
+
+    def _bases(self, names: Node, path: Path) -> Node | None:
+        """What ``extends:`` names, a later name laid over an earlier one; None after a mistake."""
+        items = names.items if isinstance(names, Listing) and names.items else (names,)
+        bases = [self._base(name, path) for name in items]
+        found = [base for base in bases if base is not None]
+        return reduce(merge, found) if found and len(found) == len(bases) else None
 
     def _base(self, name: Node, path: Path) -> Node | None:
         """What ``extends: name`` in the file ``path`` names, or None after a mistake."""
         if not (isinstance(name, Scalar) and isinstance(name.value, str) and name.value):
             self._wrong(name.place, "is not a name", "write the name of a profile file, as devices/ec40")
             return None
+        if name.value.startswith(catalogue.PREFIX):
+            return self._part(name.value.removeprefix(catalogue.PREFIX), name.place)
         found = [file for file in _candidates(name.value, path) if os.path.isfile(file)]
         if not found:
             self._wrong(name.place, f"there is no file {name.value!r}", _did_you_mean(name.value))
@@ -157,6 +167,13 @@ class Assembly:
             self._wrong(name.place, f"goes in a circle: {chain}", "remove one of them")
             return None
         return self._file(base)
+
+    def _part(self, order_number: str, place: Place) -> Node | None:
+        part = catalogue.parts().get(order_number)
+        if part is None:
+            self._wrong(place, f"the catalogue has no {order_number!r}", "`canhelm profile catalogue` lists its parts")
+            return None
+        return part.data
 
     def _wrong(self, place: Place, what: str, remedy: str) -> None:
         self.mistakes.append(Mistake(place, "extends", what, remedy))

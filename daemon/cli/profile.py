@@ -13,6 +13,7 @@ from cyclopts import App, Parameter
 
 from canhelm.errors import ConfigError, Refused, UsageError
 from daemon.cli.output import Json, say, show, wants_json, words
+from profiles import catalogue
 from profiles.loader import CALIBRATION, SHIPPED, LoadedProfile, ProfileError, available, find, load
 from profiles.provenance import FieldPath, dotted
 from profiles.schema import SCHEMA_VERSION
@@ -61,6 +62,30 @@ def show_(name: str, /, *, effective: Annotated[bool, Parameter(negative=())] = 
     loaded = load(name)
     rows = list(_rows(loaded))
     show(rows if effective else [row for row in rows if _is_own(row, loaded.path)], table=_table, json=json)
+
+
+@app.command(name="catalogue")
+def catalogue_(pattern: str = "", /, *, json: Json = None) -> None:
+    """Motors, encoders and gears by maxon order number, for `extends: catalogue/NUMBER` in a profile.
+
+    Example: `canhelm profile catalogue HEDL`
+
+    Args:
+        pattern: Part of a number, kind or name, capitals alike.
+    """
+    rows = [_part_row(part) for part in catalogue.parts().values()]
+    wanted = pattern.lower()
+    show([row for row in rows if wanted in " ".join(map(str, row.values())).lower()], table=_table, json=json)
+
+
+def _part_row(part: catalogue.Part) -> dict[str, Any]:
+    return {
+        "order_number": part.order_number,
+        "kind": part.kind,
+        "name": part.name,
+        "assumed": ", ".join(part.assumed),
+        "source": part.source,
+    }
 
 
 @app.command

@@ -172,7 +172,7 @@ def test_a_file_that_extends_itself_is_a_mistake(tmp_path: Path) -> None:
         load(tmp_path / "a.yaml")
 
 
-@pytest.mark.parametrize("text", ["~", "[max2d]", "''", "7"])
+@pytest.mark.parametrize("text", ["~", "[]", "[[max2d]]", "''", "7"])
 def test_extends_wants_a_name(mistakes: Mistakes, text: str) -> None:
     assert mistakes(f"network: {{extends: {text}}}")[0].startswith("lab.yaml:4: extends: is not a name")
 
