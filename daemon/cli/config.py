@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
-from canhelm.errors import ConfigError, NodeAbsent, UsageError
-from daemon.cli.options import DEFAULT, Node, Options, node_of
+from canhelm.errors import ConfigError, NodeAbsent
+from daemon.cli.options import DEFAULT, Node, Options, agreed, node_of
 from daemon.cli.output import say, show, wants_json
 from drivers.canopen.dcf import Commissioning, make_dcf
 from drivers.canopen.eds_text import EdsText, read_eds_text
 from drivers.canopen.objects import parse_address
+from drivers.epos.objects import OBJECTS
 from drivers.epos.parameters import EPOS_24_5, SETTINGS
+from drivers.explain_codes import value_words
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -35,7 +36,7 @@ def dump(node: Node, file: Path, /, *, options: Options = DEFAULT) -> None:
         file: File to write.
     """
     with options.client() as client:
-        _save(client.call("config.dump", node=node_of(node)), file, options)
+        show([_save(client.call("config.dump", node=node_of(node)), file)], _files, options.json)
 
 
 @app.command
@@ -93,8 +94,7 @@ def backup(folder: Path, node: Node = "all", /, *, options: Options = DEFAULT) -
     """
     with options.client() as client:
         drives = client.call("config.backup", node=node_of(node))["drives"]
-    for drive in drives:
-        _save(drive, folder / _file_name(drive["node"]), options)
+    show([_save(drive, folder / _file_name(drive["node"])) for drive in drives], _files, options.json)
 
 
 @app.command
@@ -124,15 +124,8 @@ def restore(
         params = {"values": _values(text, number), "product_code": _product(text)}
         if dry_run or not yes:
             _report(client.call("config.restore", node=number, dry_run=True, **params), options)
-        if not dry_run and (yes or _agreed(number)):
+        if not dry_run and (yes or agreed(f"write, save and restart node {number}?")):
             _report(client.call("config.restore", node=number, **params), options)
-
-
-def _agreed(node: int) -> bool:
-    if not sys.stdin.isatty():
-        raise UsageError("nobody is there to agree", remedy="look at --dry-run, then say --yes")
-    print(f"write, save and restart node {node}? [y/N] ", end="", file=sys.stderr, flush=True)
-    return sys.stdin.readline().strip().lower() in ("y", "yes")
 
 
 def _number_of(status: dict[str, Any], node: str) -> int:
@@ -173,7 +166,8 @@ def _product(text: EdsText | None) -> int | None:
     return text.number("DeviceInfo", "ProductNumber") if text else None
 
 
-def _save(drive: dict[str, Any], file: Path, options: Options) -> None:
+def _save(drive: dict[str, Any], file: Path) -> dict[str, Any]:
+    """Write the settings of one drive; what was written, for people."""
     found = {parse_address(text): value for text, value in drive["values"].items()}
     values = {address: value for address, value in found.items() if address}
     entries = [entry for entry in SETTINGS if (entry.index, entry.sub) in values]
@@ -184,7 +178,7 @@ def _save(drive: dict[str, Any], file: Path, options: Options) -> None:
         file.write_text(make_dcf(entries, device, commissioning, values), encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"{file} cannot be written ({error.strerror})", remedy="choose another place") from None
-    show({"node": drive["node"], "name": drive["name"], "file": str(file), "settings": len(values)}, json=options.json)
+    return {"node": drive["node"], "name": drive["name"], "file": str(file), "settings": len(values)}
 
 
 # --- what is said ----------------------------------------------------------------------------------------------------
@@ -209,11 +203,24 @@ def _report(result: dict[str, Any], options: Options) -> None:
 
 
 def _changes(rows: Sequence[dict[str, Any]]) -> Table:
+    people = [row | {key: _words(row, key) for key in ("was", "wanted")} for row in rows]
+    return _table(people, ("object", "name", "was", "wanted", "note"))
+
+
+def _words(row: dict[str, Any], key: str) -> str:
+    """A value with its unit or its meaning."""
+    entry = OBJECTS.find(row["object"])
+    return "-" if row[key] is None or entry is None else value_words(entry, row[key])
+
+
+def _files(rows: Sequence[dict[str, Any]]) -> Table:
+    return _table(rows, ("node", "name", "file", "settings"))
+
+
+def _table(rows: Sequence[dict[str, Any]], columns: Sequence[str]) -> Table:
     from rich.table import Table
 
-    table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
-    for column in ("object", "name", "was", "wanted", "unit", "note"):
-        table.add_column(column, justify="right" if column in ("was", "wanted") else "left")
+    table = Table(*columns, box=None, header_style="bold", pad_edge=False)
     for row in rows:
-        table.add_row(*(str(row[column]) if row[column] is not None else "-" for column in row))
+        table.add_row(*(str(row[column]) for column in columns))
     return table

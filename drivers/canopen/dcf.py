@@ -90,7 +90,13 @@ def _section(name: str, values: Mapping[str, object]) -> str:
 
 
 def _file_info(device: DeviceKind) -> dict[str, object]:
-    return {"EDSVersion": "4.0", "Description": device.product, "CreatedBy": "canhelm"}
+    return {
+        "FileVersion": 1,
+        "FileRevision": 0,
+        "EDSVersion": "4.0",
+        "Description": device.product,
+        "CreatedBy": "canhelm",
+    }
 
 
 def _device_info(device: DeviceKind) -> dict[str, object]:
