@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from drivers.epos.serial_answers import Answer, parse_answer
 from drivers.epos.serial_frames import (
+    CRC_WRONG,
     FAILED,
     OKAY,
     Frame,
@@ -96,11 +97,10 @@ def _frame(frame: Frame | str, raw: bytes) -> Iterator[Reading]:
 def _damaged(reason: str, raw: bytes) -> Reading:
     """What is wrong, and what would be right where the length is."""
     details = {}
-    if len(raw) >= 6 and len(raw) == frame_size(raw[1]):
-        details["CRC"] = (
-            f"{raw[-2:].hex(' ').upper()}; these bytes have {crc_of(raw[:-2]).to_bytes(2, 'little').hex(' ').upper()}"
-        )
-    elif raw[0] != DLE and len(raw) > 1:
+    if reason == CRC_WRONG and raw[0] != DLE:
+        right = crc_of(raw[:-2]).to_bytes(2, "little")
+        details["CRC"] = f"{raw[-2:].hex(' ').upper()}; these bytes have {right.hex(' ').upper()}"
+    elif raw[0] != DLE and len(raw) != frame_size(raw[1]):
         details["length"] = f"{len(raw)} bytes; the length byte 0x{raw[1]:02X} asks for {frame_size(raw[1])}"
     cure = "Check that all bytes were copied and no acknowledge is among them; on a real line look at cable and ground."
     return _reading("damaged or unknown frame", f"This is no frame that an EPOS takes: {reason}.", details, cure)

@@ -18,6 +18,9 @@ OKAY = 0x4F
 FAILED = 0x46
 """Acknowledge byte ``F``: not ready, or the CRC was wrong."""
 
+CRC_WRONG = "CRC wrong"
+"""The reason of :func:`parse_frame` that a drive answers with ``F``."""
+
 MAX_WORDS = 256
 MAX_SEGMENT_BYTES = 63
 TOGGLE_BIT = 0x40
@@ -85,7 +88,7 @@ def parse_frame(raw: bytes) -> Frame | str:
     if len(raw) != frame_size(raw[1]):
         return "length byte and length differ"
     if crc_of(raw[:-2]) != raw[-2] | raw[-1] << 8:
-        return "CRC wrong"
+        return CRC_WRONG
     return Frame(raw[0], raw[2:-2])
 
 

@@ -135,10 +135,11 @@ def test_a_tpdo_of_four_bytes_is_one_of_an_encoder() -> None:
     ]
 
 
-def test_an_rpdo_is_read_in_both_driving_modes() -> None:
+def test_an_rpdo_is_read_in_every_driving_mode() -> None:
     assert [list(reading.details) for reading in explain("201#0F0006FFFFFF")] == [
         ["controlword (0x6040)", "target_velocity (0x60FF)"],
         ["controlword (0x6040)", "velocity_mode_setting_value (0x206B)"],
+        ["controlword (0x6040)", "target_position (0x607A)"],
     ]
 
 
