@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Callable, Coroutine
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -34,7 +35,8 @@ def run(
 
     Args:
         profile: Name of a profile, or a YAML file.
-        bus: `socketcan:can0` or another INTERFACE:CHANNEL of python-can; `simulated`.
+        bus: `socketcan:can0` or another INTERFACE:CHANNEL of python-can; `rs232:/dev/ttyS0@115200` for the serial line
+            of one EPOS that forwards to the others; `simulated`, or `rs232` for a simulated serial line.
         simulate: Simulate the network of the profile in this process; the same as `--bus simulated`.
         virtual_time: Refused here: clients live in real time. `canhelm demo --virtual-time` has it.
         seed: Seed of everything random in the simulated network.
@@ -46,6 +48,7 @@ def run(
         gateway_write: Let them write objects and command network states through the gateway's socket, too.
     """
     from daemon.app import App, GatewayAccess
+    from daemon.runtime.clock import run_precise
     from profiles.loader import load
 
     chosen = _bus(bus, simulate=simulate)
@@ -76,16 +79,19 @@ def run(
         )
         await app.run()
 
-    asyncio.run(serve())
+    runner: Callable[[Coroutine[Any, Any, None]], None] = run_precise if _simulated(chosen) else asyncio.run
+    runner(serve())
     say("the vehicle is at rest and its drives are off")
     return 0
 
 
 def _bus(bus: str | None, *, simulate: bool) -> str:
-    if simulate and bus not in (None, "simulated"):
+    if simulate and bus is not None and not _simulated(bus):
         raise UsageError(f"--simulate and --bus {bus} contradict each other", remedy="give one of them")
-    if simulate or bus == "simulated":
-        return "simulated"
-    if bus is None:
+    if bus is None and not simulate:
         raise UsageError("which bus?", remedy="give --simulate, or --bus socketcan:can0")
-    return bus
+    return bus or "simulated"
+
+
+def _simulated(bus: str) -> bool:
+    return bus.partition("@")[0] in ("simulated", "rs232")

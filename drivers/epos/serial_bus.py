@@ -171,7 +171,7 @@ class SerialGatewayBus(Bus):
         elif can_id == 0x000:
             self._command(NmtCommand(data[0]), data[1])
         elif can_id == 0x080:
-            self._read_round(deadline_s)
+            self._read_round()
         elif node == self.gateway:
             self.write(EPOS["controlword"].index, 0, data[:2], deadline_s, urgent=True)
         else:
@@ -239,20 +239,21 @@ class SerialGatewayBus(Bus):
         toggle = self._toggles[node] = self._toggles.get(node, 0) ^ 0x80
         self._receive(0x700 + node, bytes((toggle | state,)))
 
-    def _read_round(self, deadline_s: float) -> None:
+    def _read_round(self) -> None:
+        """Ask every node that runs and is not being asked already; a reading that comes late is still a reading."""
         self._rounds += 1
         for node, state in self._states.items():
             if state is not NmtState.OPERATIONAL or node in self.silent or node in self._asked:
                 continue
             if node == self.gateway:
-                self._read_gateway(deadline_s)
+                self._read_gateway()
             elif node in self._encoders:
                 position = self._encoders[node]["position_value"]
-                self._ask(node, make_read_object(node, position.index, 0), 0x280 + node, deadline_s)
+                self._ask(node, make_read_object(node, position.index, 0), 0x280 + node)
             else:
-                self._ask(node, make_request_can_frame(0x180 + node, TPDO1.size), 0x180 + node, deadline_s)
+                self._ask(node, make_request_can_frame(0x180 + node, TPDO1.size), 0x180 + node)
 
-    def _ask(self, node: int, request: bytes, can_id: int, deadline_s: float) -> None:
+    def _ask(self, node: int, request: bytes, can_id: int) -> None:
         def take(data: bytes) -> None:
             if can_id & 0x780 == 0x180:
                 self._hand_up_drive(node, data)
@@ -260,9 +261,9 @@ class SerialGatewayBus(Bus):
                 self._receive(can_id, data)
 
         self._asked.add(node)
-        self._submit(request, node, deadline_s, take, then=lambda: self._asked.discard(node))
+        self._submit(request, node, math.inf, take, then=lambda: self._asked.discard(node))
 
-    def _read_gateway(self, deadline_s: float) -> None:
+    def _read_gateway(self) -> None:
         def status(data: bytes) -> None:
             self._statusword = data[:2]
 
@@ -273,13 +274,13 @@ class SerialGatewayBus(Bus):
             self._hand_up_drive(self.gateway, self._statusword + data + self._current)
 
         self._asked.add(self.gateway)
-        self._read_own("statusword", status, deadline_s)
+        self._read_own("statusword", status)
         if self._rounds % CURRENT_EVERY == 0:
-            self._read_own("current_actual_value", current, deadline_s)
-        self._read_own("position_actual_value", position, deadline_s, lambda: self._asked.discard(self.gateway))
+            self._read_own("current_actual_value", current)
+        self._read_own("position_actual_value", position, lambda: self._asked.discard(self.gateway))
 
-    def _read_own(self, name: str, take: OnData, deadline_s: float, then: Callable[[], None] | None = None) -> None:
-        self._submit(make_read_object(self.gateway, EPOS[name].index, 0), self.gateway, deadline_s, take, then=then)
+    def _read_own(self, name: str, take: OnData, then: Callable[[], None] | None = None) -> None:
+        self._submit(make_read_object(self.gateway, EPOS[name].index, 0), self.gateway, math.inf, take, then=then)
 
     def _hand_up_drive(self, node: int, tpdo1: bytes) -> None:
         """Hand a drive's reading up; when it has just gone into fault, after the error that it recorded.

@@ -20,6 +20,9 @@ from drivers.epos.serial_handshake import BITS_PER_BYTE, Exchange, Outcome, Phas
 _FILLER = bytes(frame_size(MAX_WORDS - 1))
 """Ends any frame whose rest a drive may still be waiting for: the CRC of what it completes is wrong."""
 _UNHEARD_BEFORE_FILLER = 2
+STALL_S = 0.005
+"""A timer that is later than this tells of a process that stood still."""
+GRACE_S = 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,6 +133,8 @@ class Conversation:
         self._disturbed = False
         self._unheard = 0
         self._our_turn_s = math.inf
+        self._due_s = math.inf
+        self._stalled = False
         self._transport = transport
         transport.host = self.receive
 
@@ -201,6 +206,8 @@ class Conversation:
     def _await_phase(self, sent: int) -> None:
         """Wait for what comes next, beyond the time that the host's own bytes and the drive's first one take."""
         patience_s = self._patience_s[self.exchange.phase] + (sent + 1) * self._byte_s
+        self._stalled = False
+        self._due_s = self._loop.time() + patience_s
         self._wait(patience_s, self._on_silence)
 
     def _wait(self, delay_s: float, callback: Callable[[], None]) -> None:
@@ -209,7 +216,11 @@ class Conversation:
         self._timer = self._loop.call_later(delay_s, callback)
 
     def _on_silence(self) -> None:
-        """The drive says nothing more."""
+        """The drive says nothing more, unless this process stood still and what it said is waiting to be read."""
+        if self._loop.time() - self._due_s > STALL_S and not self._stalled:
+            self._stalled = True
+            self._wait(GRACE_S, self._on_silence)
+            return
         last_word = self.exchange.give_up(self._loop.time())
         if last_word:
             self._send(last_word)
