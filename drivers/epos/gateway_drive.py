@@ -27,11 +27,6 @@ def ahead_s(speed_m_s: float, cycle_s: float, acceleration_m_s2: float) -> float
     return AHEAD_CYCLES * cycle_s + abs(speed_m_s) / (2.0 * acceleration_m_s2)
 
 
-def stopping_way_m(speed_m_s: float, cycle_s: float, acceleration_m_s2: float) -> float:
-    """The way that the wheel still rolls when the line falls silent: all that its last target lies ahead."""
-    return abs(speed_m_s) * ahead_s(speed_m_s, cycle_s, acceleration_m_s2)
-
-
 class GatewayDrive(EposDrive):
     """An EPOS that is commanded by objects of its own serial line; fulfils ``drivers.contract.Drive``."""
 

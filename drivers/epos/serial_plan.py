@@ -32,6 +32,8 @@ SPARE = 1.15
 """Share of the line left for guarding, SDO of people, and repetitions."""
 HEADING_TOLERANCE_DEG = 0.5
 """A pair that turns at the slower rate is not stopped more exactly than this."""
+LIFE_TIME_FACTOR = 2
+"""A broken conversation costs the line half a second; a vehicle that moves is then stopped anyway."""
 FOLLOWING_ERROR_TURNS = 5
 """Motor turns that the drive on the line may be off its demand."""
 REACTION_CYCLES_CAN = 2
@@ -123,6 +125,7 @@ def serial_profile(profile: Profile, baud: int) -> Profile:
             network,
             cycle_hz=round(line.cycle_hz, 3),
             guard_time_ms=round(1e3 * line.guard_time_s),
+            life_time_factor=LIFE_TIME_FACTOR,
             boot_deadline_s=30.0,
             sdo_timeout_s=2.5,
             synchronous=False,
@@ -134,7 +137,7 @@ def serial_profile(profile: Profile, baud: int) -> Profile:
 
 
 def _expiring(drive: DriveConfig) -> DriveConfig:
-    """The drive on the line: position targets, whose following error counts while the wheels are coupled by the floor."""
+    """The drive on the line gets position targets; its following error counts, and the floor couples the wheels."""
     error_qc = max(drive.max_following_error_qc, FOLLOWING_ERROR_TURNS * drive.qc_per_motor_turn)
     return msgspec.structs.replace(drive, mode="expiring_position", max_following_error_qc=error_qc)
 
@@ -150,3 +153,21 @@ def serial_limits(limits: Limits, deceleration_m_s2: float, can_cycle_s: float, 
         steering_rim_speed_m_s=round(steering, 3),
         heading_tolerance_deg=max(limits.heading_tolerance_deg, HEADING_TOLERANCE_DEG),
     )
+
+
+def stopping_time_s(profile: Profile, speed_m_s: float) -> float:
+    """Time from a line that falls silent to wheels at rest: guarding runs out, then the quick-stop ramp [s].
+
+    Args:
+        profile: as :func:`serial_profile` makes it.
+        speed_m_s: rim speed of the fastest wheel.
+    """
+    life_s = profile.network.guard_time_ms * profile.network.life_time_factor / 1e3
+    return life_s + abs(speed_m_s) / min(drive.quick_stop_m_s2 for drive in profile.drives.values())
+
+
+def stopping_way_m(profile: Profile, speed_m_s: float) -> float:
+    """The way that a wheel rolls in that time [m]."""
+    life_s = profile.network.guard_time_ms * profile.network.life_time_factor / 1e3
+    ramp = min(drive.quick_stop_m_s2 for drive in profile.drives.values())
+    return abs(speed_m_s) * life_s + speed_m_s**2 / (2.0 * ramp)

@@ -9,12 +9,13 @@ from typing import Any
 import pytest
 
 from canhelm.errors import CanhelmError
-from drivers.epos.gateway_drive import stopping_way_m
-from drivers.epos.serial_plan import plan, serial_limits, serial_speed_m_s
+from drivers.epos.serial_plan import plan, serial_limits, serial_speed_m_s, stopping_time_s, stopping_way_m
 from profiles.loader import load
 from vcan_tests.robot import Robot, running_robot
 
 MAX2D = load("max2d").profile
+SETTLING_S = 0.3
+"""Time in which tyres and wheels come to rest after the ramp."""
 
 
 async def test_it_boots_and_steers_to_within_a_degree() -> None:
@@ -56,21 +57,26 @@ async def _at_speed(robot: Robot, speed_m_s: float) -> asyncio.Task[dict[str, An
 async def test_a_pulled_cable_stops_every_wheel_within_the_stated_way() -> None:
     async with running_robot(bus="rs232", expect_errors=True) as robot:
         driving = await _at_speed(robot, 0.3)
-        network, drive = robot.app.profile.network, MAX2D.drives["rear_left"]
         x, _, _ = robot.network.world.pose
         assert robot.app.wire.cable is not None
         robot.app.wire.cable.pulled = True
-        begin = asyncio.get_running_loop().time()
-        life_s = network.guard_time_ms * network.life_time_factor / 1e3
-        await asyncio.sleep(life_s + 0.3 / drive.quick_stop_m_s2 + 0.2)
-        assert robot.fastest_wheel_m_s < 0.01
-        way = robot.network.world.pose[0] - x
-        guarded = 0.3 * life_s + 0.3**2 / (2 * drive.quick_stop_m_s2)
-        own = stopping_way_m(0.3, 1.0 / network.cycle_hz, drive.acceleration_m_s2)
-        assert way < max(guarded, own) + 0.02
-        assert asyncio.get_running_loop().time() - begin < 1.5
+        took = await robot.until(lambda: robot.fastest_wheel_m_s < 0.01, 3.0)
+        assert took < stopping_time_s(robot.app.profile, 0.3) + SETTLING_S
+        assert robot.network.world.pose[0] - x < stopping_way_m(robot.app.profile, 0.3) + 0.02
         with pytest.raises(CanhelmError):
             await driving
+
+
+async def test_a_cable_pulled_while_a_pair_turns_stops_it_in_the_stated_time() -> None:
+    async with running_robot(bus="rs232", expect_errors=True) as robot:
+        steering = asyncio.create_task(robot.call("steer", pair="front", angle_deg=80.0))
+        await robot.until(lambda: robot.network.world.heading_rad("front") > 0.3)
+        assert robot.app.wire.cable is not None
+        robot.app.wire.cable.pulled = True
+        took = await robot.until(lambda: robot.fastest_wheel_m_s < 0.01, 3.0)
+        assert took < stopping_time_s(robot.app.profile, robot.app.profile.limits.steering_rim_speed_m_s) + SETTLING_S
+        with pytest.raises(CanhelmError):
+            await steering
 
 
 async def test_a_drive_without_power_is_left_out_and_stops_the_vehicle() -> None:
