@@ -16,6 +16,7 @@ import threading
 import time
 from heapq import heapify, heappop, heappush
 from pathlib import PurePath
+from typing import Any
 
 import can
 
@@ -26,11 +27,14 @@ from drivers.bus.wire_time import LoadMeter, frame_bits
 LOGGER = logging.getLogger("canhelm.bus")
 
 QUEUE_DEPTH = 64
+MAX_BYTES = 8
 RETRY_S = 0.001
 REOPEN_S = 1.0
 READER_TIMEOUT_S = 0.1
 SERIAL_SEND_TIMEOUT_S = 0.01
 """Longest time that a serial adapter may hold up the loop; SocketCAN never does."""
+OPTIONS: dict[str, dict[str, Any]] = {"slcan": {"timeout": 0.0}}
+"""What interfaces need beside channel and bit rate: a serial port that does not wait for the next byte."""
 
 _GONE = {errno.ENETDOWN, errno.ENODEV, errno.ENXIO, errno.EIO, errno.EBADF}
 _ERROR_CLASS_BUS_OFF = 0x40  # linux/can/error.h
@@ -164,12 +168,20 @@ class PythonCanBus(Bus):
         while self._link is not None:
             try:
                 message = self._link.recv(0)
-            except ValueError:  # an adapter's line that is none
+            except (ValueError, IndexError) as error:  # an adapter's line that is none
                 self.foreign += 1
+                if isinstance(error, UnicodeDecodeError):
+                    self._forget_line()
                 continue
             if message is None:
                 return
             self._take(message)
+
+    def _forget_line(self) -> None:
+        """Drop what an adapter has said so far; slcan of python-can would fail on it again with every further line."""
+        flush = getattr(self._link, "flush", None)
+        if flush is not None:
+            flush()
 
     def _read_until_closed(self, link: can.BusABC) -> None:
         """The reader thread of an interface without a file descriptor."""
@@ -188,7 +200,7 @@ class PythonCanBus(Bus):
             return  # read just before the interface was closed
         if message.is_error_frame:
             self._take_error(message)
-        elif message.is_extended_id or message.is_fd:
+        elif message.is_extended_id or message.is_fd or len(message.data) > MAX_BYTES:
             self.foreign += 1
         else:
             remote = message.is_remote_frame
@@ -233,7 +245,10 @@ class PythonCanBus(Bus):
         self.down = None
 
     def _open_link(self) -> can.BusABC:
-        return can.Bus(channel=self.channel, interface=self.interface, bitrate=self.bit_rate, ignore_config=True)
+        options = OPTIONS.get(self.interface, {})
+        return can.Bus(
+            channel=self.channel, interface=self.interface, bitrate=self.bit_rate, ignore_config=True, **options
+        )
 
     def _listen(self, link: can.BusABC) -> None:
         """Begin to receive; an interface that is down says so at the first reading."""
