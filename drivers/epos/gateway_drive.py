@@ -2,7 +2,9 @@
 
 No frame of another node reaches its life guarding, and it hears no PDO. It is therefore driven in profile position mode
 (maxon EPOS Firmware Specification 9.2) by objects: each cycle sets a target that is only a short time of travel ahead.
-When no new one comes the drive comes to rest there by its own ramp.
+When no new one comes the drive comes to rest there by its own ramp. The others, which roll on until their guarding runs
+out, may drag it past its target; the limit of its following error (object 0x6065) then switches it off, so that it does
+not pull the vehicle back.
 """
 
 from __future__ import annotations

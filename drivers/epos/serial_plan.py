@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import msgspec
 
-from profiles.schema import DriveConfig, Limits, Profile
+from profiles.schema import Limits, Profile
 
 READ_BYTES = 24
 """ReadObject: 10 from the host, 14 from the drive, acknowledges included."""
@@ -34,8 +34,6 @@ HEADING_TOLERANCE_DEG = 0.5
 """A pair that turns at the slower rate is not stopped more exactly than this."""
 LIFE_TIME_FACTOR = 2
 """A broken conversation costs the line half a second; a vehicle that moves is then stopped anyway."""
-FOLLOWING_ERROR_TURNS = 5
-"""Motor turns that the drive on the line may be off its demand."""
 REACTION_CYCLES_CAN = 2
 REACTION_CYCLES_SERIAL = 3
 """Cycles from something that happens to the wheels' answer: read, decide, written behind others."""
@@ -131,15 +129,12 @@ def serial_profile(profile: Profile, baud: int) -> Profile:
             synchronous=False,
             gateway=gateway,
         ),
-        drives={name: _expiring(drive) if name == gateway else drive for name, drive in profile.drives.items()},
+        drives={
+            name: replace(drive, mode="expiring_position") if name == gateway else drive
+            for name, drive in profile.drives.items()
+        },
         limits=serial_limits(profile.limits, deceleration, 1.0 / network.cycle_hz, line.cycle_s),
     )
-
-
-def _expiring(drive: DriveConfig) -> DriveConfig:
-    """The drive on the line gets position targets; its following error counts, and the floor couples the wheels."""
-    error_qc = max(drive.max_following_error_qc, FOLLOWING_ERROR_TURNS * drive.qc_per_motor_turn)
-    return msgspec.structs.replace(drive, mode="expiring_position", max_following_error_qc=error_qc)
 
 
 def serial_limits(limits: Limits, deceleration_m_s2: float, can_cycle_s: float, serial_cycle_s: float) -> Limits:
