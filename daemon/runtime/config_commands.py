@@ -100,12 +100,12 @@ class ConfigCommands:
         if not dry_run:
             require_all_disabled(self._supervisor)
         async with Commissioning(drive) as commissioning:
-            notes += self._require_kind(drive, await commissioning.identity(), params["product_code"])
+            notes += _require_kind(drive, await commissioning.identity(), params["product_code"])
             found = await commissioning.read()
-            target, more = self._target(drive, wanted, found)
+            target, more = _target(drive, wanted, found)
             changes = self._changes(drive, target, found)
             if not dry_run:
-                self._require_saved(drive, target, found, save)
+                _require_saved(drive, target, found, save)
                 await self._write(commissioning, target, found, save)
         if not dry_run:
             await until_ready(drive, self._supervisor.master.network.boot_deadline_s + 1.0)
@@ -147,18 +147,6 @@ class ConfigCommands:
         notes = [f"{others} objects are no settings of an EPOS 24/5 and were left out"] if others else []
         return without_unmapped(wanted), notes
 
-    def _target(self, drive: EposDrive, wanted: Values, found: Values) -> tuple[Values, list[str]]:
-        """What can be written of it: nothing that the drive lacks, not its addressing, not the brakes' outputs."""
-        absent = [entry for entry in wanted if entry not in found]
-        kept = [entry for entry in ADDRESSING if wanted.get(entry, found[entry]) != found[entry]]
-        notes = [f"{_words(entry)} is absent in this drive's firmware and was left out" for entry in absent]
-        notes += [f"{_words(entry)} stays {found[entry]}, not {wanted[entry]}: {BY_HAND}" for entry in kept]
-        target = {entry: value for entry, value in wanted.items() if entry not in (*absent, *ADDRESSING)}
-        brakes = drive.outputs.own_bits
-        if brakes:
-            target[OUTPUT_MASK] = target.get(OUTPUT_MASK, found[OUTPUT_MASK]) & ~brakes
-        return target, notes
-
     def _changes(self, drive: EposDrive, wanted: Values, found: Values) -> list[dict[str, Any]]:
         """Every difference for people and programs."""
         profile = expected_settings(drive.config, self._supervisor.master.network)
@@ -175,31 +163,46 @@ class ConfigCommands:
             if found.get(entry) != value
         ]
 
-    def _require_saved(self, drive: EposDrive, target: Values, found: Values, save: bool) -> None:
-        late = [entry for entry, value in target.items() if counts_from_start(entry) and found[entry] != value]
-        if late and not save:
-            names = ", ".join(map(_words, late))
-            raise Refused(
-                f"{drive.who}: {names} takes effect after saving and a restart only",
-                node=drive.node,
-                object=late[0].address,
-                remedy="add --save: the settings are kept and the drive restarts",
-            )
 
-    def _require_kind(self, drive: EposDrive, identity: Mapping[str, int], product_code: int | None) -> list[str]:
-        """Raise Refused for the settings of another kind of drive; a note for those of another firmware."""
-        code = identity["product_code"]
-        if product_code is None or product_code == code:
-            return []
-        if product_code >> HARDWARE_SHIFT != code >> HARDWARE_SHIFT:
-            raise Refused(
-                f"{drive.who} is product 0x{code:08X}, the settings are of product 0x{product_code:08X}",
-                node=drive.node,
-                value=code,
-                limit=product_code,
-                remedy="take the settings of a drive of the same hardware",
-            )
-        return [f"the settings are of product 0x{product_code:08X}, this drive is 0x{code:08X}: another firmware"]
+def _target(drive: EposDrive, wanted: Values, found: Values) -> tuple[Values, list[str]]:
+    """What can be written of it: nothing that the drive lacks, not its addressing, not the brakes' outputs."""
+    absent = [entry for entry in wanted if entry not in found]
+    kept = [entry for entry in ADDRESSING if wanted.get(entry, found[entry]) != found[entry]]
+    notes = [f"{_words(entry)} is absent in this drive's firmware and was left out" for entry in absent]
+    notes += [f"{_words(entry)} stays {found[entry]}, not {wanted[entry]}: {BY_HAND}" for entry in kept]
+    target = {entry: value for entry, value in wanted.items() if entry not in (*absent, *ADDRESSING)}
+    brakes = drive.outputs.own_bits
+    if brakes:
+        target[OUTPUT_MASK] = target.get(OUTPUT_MASK, found[OUTPUT_MASK]) & ~brakes
+    return target, notes
+
+
+def _require_saved(drive: EposDrive, target: Values, found: Values, save: bool) -> None:
+    late = [entry for entry, value in target.items() if counts_from_start(entry) and found[entry] != value]
+    if late and not save:
+        names = ", ".join(map(_words, late))
+        raise Refused(
+            f"{drive.who}: {names} takes effect after saving and a restart only",
+            node=drive.node,
+            object=late[0].address,
+            remedy="add --save: the settings are kept and the drive restarts",
+        )
+
+
+def _require_kind(drive: EposDrive, identity: Mapping[str, int], product_code: int | None) -> list[str]:
+    """Raise Refused for the settings of another kind of drive; a note for those of another firmware."""
+    code = identity["product_code"]
+    if product_code is None or product_code == code:
+        return []
+    if product_code >> HARDWARE_SHIFT != code >> HARDWARE_SHIFT:
+        raise Refused(
+            f"{drive.who} is product 0x{code:08X}, the settings are of product 0x{product_code:08X}",
+            node=drive.node,
+            value=code,
+            limit=product_code,
+            remedy="take the settings of a drive of the same hardware",
+        )
+    return [f"the settings are of product 0x{product_code:08X}, this drive is 0x{code:08X}: another firmware"]
 
 
 def _fitting(entry: ObjectDef, value: int) -> int:

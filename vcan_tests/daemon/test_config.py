@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
-from canhelm.errors import Aborted, Interlock, Refused, UsageError
+from canhelm.errors import Aborted, Interlock, NodeAbsent, Refused, Timeout, UsageError
 from drivers.epos.objects import OBJECTS
 from drivers.simulated.epos import SimulatedEpos
+from profiles.loader import load
+from profiles.schema import Gains
 from vcan_tests.robot import Robot, running_robot
 
 MOTOR_TYPE, ACCELERATION, HOMING = "0x6402", "0x6083", "0x2080"
@@ -200,3 +204,41 @@ async def test_an_object_is_read_with_type_and_unit() -> None:
     async with running_robot() as robot:
         found = await robot.call("sdo.read", node=1, object="0x6410/5")
         assert (found["value"], found["type"], found["unit"]) == (40, "u16", "100 ms")
+
+
+async def test_a_drive_that_is_being_booted_is_waited_for() -> None:
+    async with running_robot(powered=False, booted=False) as robot:
+        robot.network.power_on("all")
+        await robot.until(lambda: robot.app.devices.by_node[1].node_state.value == "configuring")
+        result = await change(robot, node=1, values={HOMING: 650})
+        assert result["node_state"] == "ready"
+        assert (await backup(robot, 1))[HOMING] == 650
+
+
+@pytest.mark.parametrize("after_s", [0.02, 0.1, 0.16, 0.2])
+async def test_a_drive_that_goes_away_while_it_is_changed_is_told_and_comes_back_by_itself(after_s: float) -> None:
+    async with running_robot(expect_errors=True) as robot:
+        asyncio.get_running_loop().call_later(after_s, robot.network.power_off, 1)
+        with pytest.raises((NodeAbsent, Timeout)):
+            await change(robot, node=1, values={HOMING: 650, ACCELERATION: 7}, save=True)
+        robot.network.power_on(1)
+        await until_idle(robot)
+        assert not (await robot.call("config.diff", node=1, values=None))["differences"]
+
+
+async def test_gains_that_the_profile_gives_are_written_at_each_boot_and_the_others_left_alone() -> None:
+    profile = load("max2d").profile
+    drives = {
+        name: replace(drive, gains=Gains(velocity_p=1500, velocity_i=0)) for name, drive in profile.drives.items()
+    }
+    async with running_robot(replace(profile, drives=drives)) as robot:
+        values = await backup(robot, 2)
+        assert (values["0x60F9/1"], values["0x60F9/2"], values["0x60F6/1"]) == (1500, 0, 0)
+        assert not (await robot.call("config.diff", node=2, values=None))["differences"]
+
+
+@pytest.mark.parametrize("node", [1, 2, 3, 4])
+async def test_after_its_boot_a_drive_is_what_the_profile_expects(node: int) -> None:
+    async with running_robot() as robot:
+        found = await robot.call("config.diff", node=node, values=None)
+        assert (found["compared"] > 30, found["differences"]) == (True, [])
