@@ -16,7 +16,7 @@ from drivers.bus.contract import Bus
 from drivers.encoder.objects import OBJECTS as ENCODER_OBJECTS
 from drivers.epos.serial_bus import SerialGatewayBus
 from drivers.epos.serial_conversation import Transport
-from drivers.epos.serial_plan import gateway_of, serial_profile
+from drivers.epos.serial_plan import facts, gateway_of, serial_profile
 from drivers.epos.serial_tty import SerialTty
 from drivers.simulated.bus import SimulatedBus
 from drivers.simulated.network import SimulatedNetwork
@@ -100,7 +100,7 @@ def _serial_wire(
     shrunk = serial_profile(profile, baud)
     encoders = {encoder.node: ENCODER_OBJECTS for encoder in profile.encoders.values()}
     gateway = profile.drives[gateway_of(profile)].node
-    bus = SerialGatewayBus(name, connect, baud, profile.network.bit_rate, gateway, encoders)
+    bus = SerialGatewayBus(name, connect, baud, profile.network.bit_rate, gateway, encoders, facts(profile, baud))
     return Wire(bus, shrunk, network, medium, cable, partial(LinePace, bus), reading_share=0.9)
 
 

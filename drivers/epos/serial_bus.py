@@ -65,6 +65,7 @@ class SerialGatewayBus(Bus):
         bit_rate: bit/s of the CAN bus behind it.
         gateway: node id of the drive on the line.
         encoders: object dictionaries of the encoders by node id; all other nodes are drives.
+        facts: what was planned for the line, for ``status``.
 
     Attributes:
         line: the serial line, once opened.
@@ -80,6 +81,7 @@ class SerialGatewayBus(Bus):
         bit_rate: int,
         gateway: int,
         encoders: Mapping[int, ObjectTable],
+        facts: Mapping[str, Any],
     ) -> None:
         super().__init__(name, bit_rate)
         self.baud = baud
@@ -90,6 +92,7 @@ class SerialGatewayBus(Bus):
         self._under_way = 0
         self._connect = connect
         self._encoders = encoders
+        self._facts = facts
         self._bridges: dict[int, SdoBridge] = {}
         self._states: dict[int, NmtState] = {}
         self._asked: set[int] = set()
@@ -149,6 +152,7 @@ class SerialGatewayBus(Bus):
             "line_retries": self.line.retries,
             "silent_nodes": sorted(self.silent),
             "line_down": str(self.line.down) if self.line.down else None,
+            **self._facts,
         }
 
     def load(self) -> float:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import msgspec
 
@@ -166,3 +167,21 @@ def stopping_way_m(profile: Profile, speed_m_s: float) -> float:
     life_s = profile.network.guard_time_ms * profile.network.life_time_factor / 1e3
     ramp = min(drive.quick_stop_m_s2 for drive in profile.drives.values())
     return abs(speed_m_s) * life_s + speed_m_s**2 / (2.0 * ramp)
+
+
+def facts(profile: Profile, baud: int) -> dict[str, Any]:
+    """What can be said of a profile over a line before it is tried, for ``status`` and ``doctor``.
+
+    Args:
+        profile: the robot as it is on CAN.
+        baud: of the line.
+    """
+    shrunk = serial_profile(profile, baud)
+    top = shrunk.limits.wheel_speed_m_s
+    return {
+        "planned_hz": round(shrunk.network.cycle_hz, 1),
+        "planned_hz_at_baud": {str(rate): round(plan(profile, rate).cycle_hz, 1) for rate in (115200, 38400)},
+        "speed_limit_m_s": shrunk.limits.speed_m_s,
+        "silent_line_stop_s": round(stopping_time_s(shrunk, top), 2),
+        "silent_line_stop_m": round(stopping_way_m(shrunk, top), 2),
+    }
