@@ -8,16 +8,15 @@ from __future__ import annotations
 import asyncio
 import itertools
 import logging
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from typing import Any
 
-from canhelm.errors import CanhelmError, DeviceFault, EmergencyStop, NotReady, Refused
+from canhelm.errors import CanhelmError, DeviceFault, NotReady, Refused
 from daemon.loops.measurement import Command, Measurement
-from daemon.runtime.brakes import BrakeKeeper
 from daemon.runtime.events import EventLog
 from daemon.runtime.leases import Leases
 from daemon.runtime.motions import Motion
-from daemon.runtime.rest import AT_REST_M_S, RestWatch
+from daemon.runtime.stopping import MOTION, Stopping
 from daemon.runtime.tasks import TaskSet
 from daemon.runtime.vehicle import Vehicle, VehicleState
 from daemon.runtime.watch import DeviceWatch
@@ -26,11 +25,6 @@ from drivers.contract import Device, Drive, DriveState, NodeState
 from drivers.devices import Devices
 
 LOGGER = logging.getLogger("canhelm")
-MOTION = "motion"
-"""Name of the tasks that carry out motions."""
-STOP = "stop"
-"""Name of the tasks that switch every power stage off."""
-POWERLESS = (DriveState.DISABLED, DriveState.UNKNOWN, DriveState.FAULT)
 
 
 class Supervisor:
@@ -41,6 +35,9 @@ class Supervisor:
         vehicle: which loops the profile runs.
         period_s: the control cycle's period.
         lease_timeout_s: how long a motion goes on without its holder's renewal.
+
+    Attributes:
+        stop, estop, fault, power_off, until_rest: those of :class:`daemon.runtime.stopping.Stopping`.
     """
 
     def __init__(
@@ -59,14 +56,11 @@ class Supervisor:
         self._period_s = period_s
         self._numbers = itertools.count(1)
         self._tasks = TaskSet(self._on_task_failure)
-        self._rest = RestWatch()
         self._watch = DeviceWatch(devices, period_s)
-        self._estop_reason = ""
-        self._fault: DeviceFault | None = None
-        self._latched = 0
-        self._halting = 0
-        self._closing = False
-        self.brakes = BrakeKeeper(devices, vehicle.brakes, self._tasks, self._on_brake_failure)
+        self._stopping = stopping = Stopping(devices, vehicle, self.motions, self._tasks, self.log, self._drop_targets)
+        self.stop, self.estop, self.fault = stopping.stop, stopping.estop, stopping.fault
+        self.power_off, self.until_rest = stopping.power_off, stopping.until_rest
+        self.brakes = stopping.brakes
         master.on_event = self._on_node_event
 
     # --- state -------------------------------------------------------------------------------------------------
@@ -74,11 +68,11 @@ class Supervisor:
     @property
     def state(self) -> VehicleState:
         """The vehicle's state."""
-        if self._estop_reason:
+        if self._stopping.estop_reason:
             return VehicleState.ESTOP
-        if self._fault is not None:
+        if self._stopping.cause is not None:
             return VehicleState.FAULT
-        if self._halting:
+        if self._stopping.under_way:
             return VehicleState.STOPPING
         if self.powered:
             return VehicleState.ACTIVE
@@ -90,16 +84,17 @@ class Supervisor:
     @property
     def message(self) -> str:
         """One sentence about the state: what is wrong, or what is waited for."""
-        if self._estop_reason:
-            return f"emergency stop: {self._estop_reason}; reset by `canhelm reset`"
-        if self._fault is not None:
-            return f"{self._fault.message}; after the cause is gone: `canhelm reset`"
-        return "; ".join(device.status_sentence for device in self._not_ready())
+        return self._stopping.message or "; ".join(device.status_sentence for device in self._not_ready())
 
     @property
     def anything_enabled(self) -> bool:
         """True while any drive has its power stage on."""
-        return any(drive.state not in POWERLESS for drive in self.devices.drives.values())
+        return self._stopping.anything_enabled
+
+    @property
+    def powered(self) -> bool:
+        """Whether a motion is under way, be it only preparing itself, or any drive has its power stage on."""
+        return bool(self.motions) or self.anything_enabled
 
     def _not_ready(self) -> list[Device]:
         return [device for device in self.devices.by_node.values() if device.node_state is not NodeState.READY]
@@ -108,17 +103,7 @@ class Supervisor:
 
     def require_ready(self, drives: tuple[str, ...]) -> None:
         """Raise EmergencyStop, NotReady or Refused where these drives may not be moved now."""
-        if self._estop_reason:
-            raise EmergencyStop(
-                f"the emergency stop is latched: {self._estop_reason}",
-                remedy="make sure that it is safe, then `canhelm reset`",
-            )
-        if self._fault is not None:
-            raise NotReady(f"the vehicle is in fault: {self._fault.message}", remedy="`canhelm reset`")
-        if self._closing:
-            raise NotReady("the daemon is going down", remedy="start it again")
-        if self._halting:
-            raise NotReady("the vehicle is stopping", remedy="wait until it is at rest")
+        self._stopping.require_none()
         for name in drives:
             drive = self.devices.drives[name]
             if drive.node_state is not NodeState.READY:
@@ -172,7 +157,7 @@ class Supervisor:
             if drive.node_state is not NodeState.READY or drive.state in (DriveState.FAULT, DriveState.UNKNOWN):
                 continue
             try:
-                if drive in enabled_here or self._fault is not None or self._estop_reason or self._closing:
+                if drive in enabled_here or self._stopping.latched or self._stopping.closing:
                     await self.power_off(drive)
                 elif drive.state is not DriveState.ENABLED:
                     await drive.enable()
@@ -181,114 +166,12 @@ class Supervisor:
             except CanhelmError as error:
                 self.log.add("error", drive.name, error.message, error.remedy or "")
 
-    # --- stopping ----------------------------------------------------------------------------------------------
-
-    async def stop(self, reason: str) -> None:
-        """Quick stop of everything; returns when the vehicle is at rest and the drives are as before the motions."""
-        self._halt(Refused(f"the motion was stopped: {reason}"))
-        self._halting += 1
-        try:
-            await self._settled()
-            if self._fault is None and not self._estop_reason:
-                for drive in self.devices.drives.values():
-                    if drive.state is DriveState.QUICK_STOP:
-                        await self._try(drive.name, drive.enable())
-        finally:
-            self._halting -= 1
-
-    def estop(self, reason: str) -> None:
-        """Emergency stop: quick stop, then every power stage off; latched until :meth:`reset`."""
-        self._latched += 1
-        self._estop_reason = self._estop_reason or reason
-        self._halt(EmergencyStop(f"emergency stop: {reason}", remedy="`canhelm reset` when it is safe"))
-        self.log.add(
-            "error", "supervisor", f"emergency stop: {reason}", "make sure that it is safe, then `canhelm reset`"
-        )
-        self._tasks.spawn(self._stop_and_disable(), STOP)
-
-    def fault(self, error: DeviceFault) -> None:
-        """A fault that stops the vehicle: quick stop, brakes, power off; latched until :meth:`reset`."""
-        self._latched += 1
-        if self._fault is None and not self._estop_reason:
-            self._fault = error
-        self._halt(error)
-        self.log.add("error", f"node {error.node}" if error.node else "supervisor", error.message, error.remedy or "")
-        self._tasks.spawn(self._stop_and_disable(), STOP)
-
-    async def reset(self) -> dict[str, Any]:
-        """Clear the latched emergency stop and faults.
-
-        Raises:
-            DeviceFault: a cause is still there.
-            Refused: the vehicle was stopped again in the meantime; that stop stays latched.
-        """
-        latched = self._latched
-        if self._fault is not None or self._estop_reason:
-            await self._settled()
-            await self._tasks.wait(STOP)
-        for drive in self.devices.drives.values():
-            if drive.node_state is NodeState.READY and drive.state is DriveState.FAULT:
-                await drive.reset_fault()
-        if latched != self._latched:
-            raise Refused(f"stopped again during the reset: {self.message}", remedy="`canhelm reset` when it is safe")
-        for device in self.devices.by_node.values():
-            device.fault = None
-        if self._fault is not None or self._estop_reason:
-            self.log.add("info", "supervisor", "reset by a person")
-        self._fault = None
-        self._estop_reason = ""
-        return {"state": self.state.value, "message": self.message}
-
-    def _halt(self, error: CanhelmError) -> None:
-        """Command the stop, now: RPDO3 to every drive that has power or is about to, brakes to engage, motions over."""
-        for drive in self.devices.drives.values():
-            if drive.node_state is NodeState.READY and drive.state is not DriveState.FAULT:
-                drive.quick_stop()
-        self._rest.begin_anew()
-        self.command = self.vehicle.zero
-        for motion in list(self.motions.values()):
-            motion.fail(error)
-        self.brakes.on_halt()
-
-    async def _stop_and_disable(self) -> None:
-        self._halting += 1
-        try:
-            await self._settled()
-            for drive in self.devices.drives.values():
-                if drive.node_state is NodeState.READY and drive.state not in POWERLESS:
-                    await self._try(drive.name, self.power_off(drive))
-        finally:
-            self._halting -= 1
-
-    async def power_off(self, drive: Drive) -> None:
-        """Engage what holds the axis, then switch the drive off. Raises NotReady or Timeout."""
-        await self.brakes.secure(drive.name)
-        await drive.disable()
-
-    async def _settled(self) -> None:
-        await self.until_rest()
-        await self._tasks.wait(MOTION)
-
-    async def until_rest(self) -> None:
-        """Return when every wheel that can be read has been at rest for some cycles.
-
-        A wheel that does not come to rest within the time that its ramp needs is reported; waiting ends then.
-        """
-        if not await self._rest.until_rest(self.vehicle.stopping_time_s() + 1.0):
-            moving = [drive.name for drive in self.devices.drives.values() if abs(drive.speed_m_s) > AT_REST_M_S]
-            self.log.add(
-                "error",
-                "supervisor",
-                f"not at rest in the time that the ramp needs: {', '.join(moving)}",
-                "is the vehicle on a slope, or a wheel pushed by hand?",
-            )
-
     # --- the cycle ---------------------------------------------------------------------------------------------
 
     def step(self, now_s: float, dt_s: float) -> None:
         """One control step: measure, watch, ask the motions, pass the gate, transmit."""
         measurement = self.measurement = self.vehicle.measure(now_s)
-        self._rest.look(measurement.wheel_speed_m_s)
+        self._stopping.rest.look(measurement.wheel_speed_m_s)
         self._watch_leases(now_s)
         self._watch_devices(now_s)
         wanted = self._ask_motions(measurement, dt_s)
@@ -323,7 +206,7 @@ class Supervisor:
             self.release_motions(lease, f"the lease of {client} ran out")
 
     def _watch_devices(self, now_s: float) -> None:
-        if self._fault is None and not self._estop_reason:
+        if not self._stopping.latched:
             fault = self._watch.look(now_s, powered=self.powered)
             if fault is not None:
                 self.fault(fault)
@@ -331,13 +214,8 @@ class Supervisor:
     def _on_node_event(self, event: NodeEvent) -> None:
         self.log.add(event.severity, event.name or f"node {event.node}", event.message, event.remedy)
         fault = self._watch.lost(event)
-        if fault is not None and self._fault is None and self.powered:
+        if fault is not None and self._stopping.cause is None and self.powered:
             self.fault(fault)
-
-    @property
-    def powered(self) -> bool:
-        """Whether a motion is under way, be it only preparing itself, or any drive has its power stage on."""
-        return bool(self.motions) or self.anything_enabled
 
     # --- leases ------------------------------------------------------------------------------------------------
 
@@ -368,29 +246,20 @@ class Supervisor:
 
     # --- the end -----------------------------------------------------------------------------------------------
 
-    def _on_brake_failure(self, error: DeviceFault) -> None:
-        """A fault, unless one has stopped the vehicle already: its stop switches the brakes once more."""
-        if self._fault is None and not self._estop_reason:
-            self.fault(error)
-        else:
-            self.log.add("error", "supervisor", error.message, error.remedy or "")
+    async def reset(self) -> dict[str, Any]:
+        """Clear the latched emergency stop and faults; the new state. Raises as :meth:`Stopping.reset`."""
+        await self._stopping.reset()
+        return {"state": self.state.value, "message": self.message}
+
+    def _drop_targets(self) -> None:
+        self.command = self.vehicle.zero
 
     def _on_task_failure(self, name: str, error: BaseException) -> None:
         self.fault(DeviceFault(f"the daemon's {name} task failed: {error}", remedy="report it with the log"))
 
-    async def _try(self, name: str, work: Coroutine[Any, Any, None]) -> None:
-        try:
-            await work
-        except CanhelmError as error:
-            self.log.add("error", name, error.message, error.remedy or "")
-
     async def close(self) -> None:
         """Bring the vehicle to rest, switch every power stage off, and end all tasks."""
-        self._closing = True
-        powered = self.powered
-        self._halt(Refused("the motion was stopped: the daemon is going down"))
-        if powered:
-            await self._stop_and_disable()
+        await self._stopping.close()
         await self._tasks.close()
 
 

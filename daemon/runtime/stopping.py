@@ -1,0 +1,228 @@
+"""How the vehicle comes to a stop, which stops stay latched until a person resets them, and how it is known at rest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+from canhelm.errors import CanhelmError, DeviceFault, EmergencyStop, NotReady, Refused
+from daemon.runtime.brakes import BrakeKeeper
+from daemon.runtime.events import EventLog
+from daemon.runtime.motions import Motion
+from daemon.runtime.rest import AT_REST_M_S, RestWatch
+from daemon.runtime.tasks import TaskSet
+from daemon.runtime.vehicle import Vehicle
+from drivers.contract import Drive, DriveState, NodeState
+from drivers.devices import Devices
+
+MOTION = "motion"
+"""Name of the tasks that carry out motions."""
+STOP = "stop"
+"""Name of the tasks that switch every power stage off."""
+OFF = (DriveState.DISABLED, DriveState.FAULT)
+POWERLESS = (*OFF, DriveState.UNKNOWN)
+"""As far as anybody knows."""
+
+
+class Stopping:
+    """Quick stop, emergency stop and faults: what they do, and that they are latched.
+
+    Args:
+        devices: the profile's drives, encoders and brakes.
+        vehicle: for the time that its ramps need.
+        motions: those under way; a stop ends them all.
+        tasks: where stops run to their end.
+        log: hears of each.
+        drop_targets: called at each stop, so that no target outlives it.
+
+    Attributes:
+        estop_reason: why the emergency stop is latched; empty while it is not.
+        cause: the fault that is latched.
+        closing: the daemon goes down: nothing begins any more.
+    """
+
+    def __init__(
+        self,
+        devices: Devices,
+        vehicle: Vehicle,
+        motions: dict[str, Motion],
+        tasks: TaskSet,
+        log: EventLog,
+        drop_targets: Callable[[], None],
+    ) -> None:
+        self.estop_reason = ""
+        self.cause: DeviceFault | None = None
+        self.closing = False
+        self.brakes = BrakeKeeper(devices, vehicle.brakes, tasks, self._on_brake_failure)
+        self.rest = RestWatch()
+        self._devices = devices
+        self._drives = tuple(devices.drives.values())
+        self._vehicle = vehicle
+        self._motions = motions
+        self._tasks = tasks
+        self._log = log
+        self._drop_targets = drop_targets
+        self._latched = 0
+        self._halting = 0
+
+    @property
+    def latched(self) -> bool:
+        """Whether an emergency stop or a fault waits for a reset."""
+        return self.cause is not None or bool(self.estop_reason)
+
+    @property
+    def under_way(self) -> bool:
+        """Whether a stop was commanded and the vehicle is not known at rest yet."""
+        return self._halting > 0
+
+    @property
+    def message(self) -> str:
+        """What is latched, and how to get on; empty where nothing is."""
+        if self.estop_reason:
+            return f"emergency stop: {self.estop_reason}; reset by `canhelm reset`"
+        if self.cause is None:
+            return ""
+        return f"{self.cause.message}; after the cause is gone: `canhelm reset`"
+
+    def require_none(self) -> None:
+        """Raise EmergencyStop or NotReady while the vehicle is stopped, or about to be."""
+        if self.estop_reason:
+            raise EmergencyStop(
+                f"the emergency stop is latched: {self.estop_reason}",
+                remedy="make sure that it is safe, then `canhelm reset`",
+            )
+        if self.cause is not None:
+            raise NotReady(f"the vehicle is in fault: {self.cause.message}", remedy="`canhelm reset`")
+        if self.closing:
+            raise NotReady("the daemon is going down", remedy="start it again")
+        if self.under_way:
+            raise NotReady("the vehicle is stopping", remedy="wait until it is at rest")
+
+    # --- stops -------------------------------------------------------------------------------------------------
+
+    async def stop(self, reason: str) -> None:
+        """Quick stop of everything; returns when the vehicle is at rest and the drives are as before the motions."""
+        self._halt(Refused(f"the motion was stopped: {reason}"))
+        self._halting += 1
+        try:
+            await self._settled()
+            if not self.latched:
+                for drive in self._drives:
+                    if drive.state is DriveState.QUICK_STOP:
+                        await self._try(drive.name, drive.enable())
+        finally:
+            self._halting -= 1
+
+    def estop(self, reason: str) -> None:
+        """Emergency stop: quick stop, then every power stage off; latched until :meth:`reset`."""
+        self._latched += 1
+        self.estop_reason = self.estop_reason or reason
+        self._halt(EmergencyStop(f"emergency stop: {reason}", remedy="`canhelm reset` when it is safe"))
+        self._log.add(
+            "error", "supervisor", f"emergency stop: {reason}", "make sure that it is safe, then `canhelm reset`"
+        )
+        self._tasks.spawn(self._stop_and_disable(), STOP)
+
+    def fault(self, error: DeviceFault) -> None:
+        """A fault that stops the vehicle: quick stop, brakes, power off; latched until :meth:`reset`."""
+        self._latched += 1
+        if not self.latched:
+            self.cause = error
+        self._halt(error)
+        self._log.add("error", f"node {error.node}" if error.node else "supervisor", error.message, error.remedy or "")
+        self._tasks.spawn(self._stop_and_disable(), STOP)
+
+    async def close(self) -> None:
+        """The last stop: to rest, with every power stage off that has power."""
+        self.closing = True
+        powered = bool(self._motions) or self.anything_enabled
+        self._halt(Refused("the motion was stopped: the daemon is going down"))
+        if powered:
+            await self._stop_and_disable()
+
+    async def reset(self) -> None:
+        """Clear the latched emergency stop and faults.
+
+        Raises:
+            DeviceFault: a cause is still there.
+            Refused: the vehicle was stopped again in the meantime; that stop stays latched.
+        """
+        count = self._latched
+        if self.latched:
+            await self._settled()
+            await self._tasks.wait(STOP)
+        for drive in self._drives:
+            if drive.node_state is NodeState.READY and drive.state is DriveState.FAULT:
+                await drive.reset_fault()
+        if count != self._latched:
+            raise Refused(f"stopped again during the reset: {self.message}", remedy="`canhelm reset` when it is safe")
+        for device in self._devices.by_node.values():
+            device.fault = None
+        if self.latched:
+            self._log.add("info", "supervisor", "reset by a person")
+        self.cause = None
+        self.estop_reason = ""
+
+    def _halt(self, error: CanhelmError) -> None:
+        """Command the stop, now: RPDO3 to every drive that has power or is about to, brakes to engage, motions over."""
+        for drive in self._drives:
+            if drive.node_state is NodeState.READY and drive.state is not DriveState.FAULT:
+                drive.quick_stop()
+        self.rest.begin_anew()
+        self._drop_targets()
+        for motion in list(self._motions.values()):
+            motion.fail(error)
+        self.brakes.on_halt()
+
+    async def _stop_and_disable(self) -> None:
+        self._halting += 1
+        try:
+            await self._settled()
+            for drive in self._drives:
+                if drive.node_state is NodeState.READY and drive.state not in POWERLESS:
+                    await self._try(drive.name, self.power_off(drive))
+        finally:
+            self._halting -= 1
+
+    # --- rest and power ----------------------------------------------------------------------------------------
+
+    @property
+    def anything_enabled(self) -> bool:
+        """True while any drive has its power stage on."""
+        return any(drive.state not in POWERLESS for drive in self._drives)
+
+    async def power_off(self, drive: Drive) -> None:
+        """Engage what holds the axis, then switch the drive off. Raises NotReady or Timeout."""
+        await self.brakes.secure(drive.name)
+        await drive.disable()
+
+    async def _settled(self) -> None:
+        await self.until_rest()
+        await self._tasks.wait(MOTION)
+
+    async def until_rest(self) -> None:
+        """Return when every wheel that can be read has been at rest for some cycles.
+
+        A wheel that does not come to rest within the time that its ramp needs is reported; waiting ends then.
+        """
+        if not await self.rest.until_rest(self._vehicle.stopping_time_s() + 1.0):
+            moving = [drive.name for drive in self._drives if abs(drive.speed_m_s) > AT_REST_M_S]
+            self._log.add(
+                "error",
+                "supervisor",
+                f"not at rest in the time that the ramp needs: {', '.join(moving)}",
+                "is the vehicle on a slope, or a wheel pushed by hand?",
+            )
+
+    def _on_brake_failure(self, error: DeviceFault) -> None:
+        """A fault, unless one has stopped the vehicle already: its stop switches the brakes once more."""
+        if not self.latched:
+            self.fault(error)
+        else:
+            self._log.add("error", "supervisor", error.message, error.remedy or "")
+
+    async def _try(self, name: str, work: Coroutine[Any, Any, None]) -> None:
+        try:
+            await work
+        except CanhelmError as error:
+            self._log.add("error", name, error.message, error.remedy or "")
