@@ -125,8 +125,9 @@ class Motion:
 
     @property
     def counts(self) -> int:
-        """Position in quad counts as the encoder counts it: whole, from where the counter was zeroed."""
-        return int(self.axis.position_rad * self.qc_per_rad // 1.0) - self._zero_qc
+        """Position in quad counts as the encoder counts it now: whole, from where the counter was zeroed."""
+        axis = self.axis
+        return int((axis.position_rad + axis.speed_rad_s * axis.ahead_s) * self.qc_per_rad // 1.0) - self._zero_qc
 
     def set_counts(self, counts: int) -> None:
         """Let the present position have this count (power-up, homing)."""

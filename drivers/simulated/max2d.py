@@ -146,6 +146,10 @@ class Max2dWorld:
         if self._origin_s is None:
             self._origin_s = now_s
         steps = int((now_s - self._origin_s) / self._step_s + 1e-6)
+        if steps >= self._steps_done:
+            ahead_s = now_s - self._origin_s - steps * self._step_s
+            for drive in self._drives:
+                drive.axis.ahead_s = ahead_s
         while self._steps_done < steps:
             if self._a_demand_changes():
                 self._quiet_steps = 0

@@ -35,12 +35,14 @@ class TorqueSource(Protocol):
 class Axis:
     """One motor shaft with its encoder."""
 
-    __slots__ = ("current_a", "position_rad", "speed_rad_s", "torque_source")
+    __slots__ = ("ahead_s", "current_a", "position_rad", "speed_rad_s", "torque_source")
 
     def __init__(self, position_rad: float = 0.0) -> None:
         self.position_rad = position_rad
         """Angle of the motor shaft, unwrapped."""
         self.speed_rad_s = 0.0
+        self.ahead_s = 0.0
+        """Time by which the world's present is ahead of ``position_rad``: less than a step."""
         self.current_a = 0.0
         """Current that flows in the motor."""
         self.torque_source: TorqueSource | None = None
