@@ -242,3 +242,10 @@ async def test_after_its_boot_a_drive_is_what_the_profile_expects(node: int) -> 
     async with running_robot() as robot:
         found = await robot.call("config.diff", node=node, values=None)
         assert (found["compared"] > 30, found["differences"]) == (True, [])
+
+
+@pytest.mark.parametrize("node", [1, 3])
+async def test_settings_are_read_over_a_serial_line_as_over_can(node: int) -> None:
+    async with running_robot(bus="rs232") as robot, asyncio.timeout(30.0):
+        found = await robot.call("config.diff", node=node, values=None)
+        assert (len(await backup(robot, node)), found["differences"]) == (96, [])
