@@ -17,10 +17,10 @@ from profiles.loader import load
 from vcan_tests.log_reader import LogReader
 
 
-def drive(seed: int, record: Path | None, *identities: str) -> list[FigureResult]:
+def drive(seed: int, record: Path | None, *identities: str, bus: str = "simulated") -> list[FigureResult]:
     async def run() -> list[FigureResult]:
         figures = tuple(figure for figure in FIGURES if not identities or figure.identity in identities)
-        return await Demo(load("max2d").profile, seed, record, lambda _: None).run(figures)
+        return await Demo(load("max2d").profile, seed, record, lambda _: None, bus=bus).run(figures)
 
     return run_virtual(run())
 
@@ -91,6 +91,16 @@ def test_the_wheels_roll_in_the_log_as_they_did_in_the_simulation(recorded: Any)
     qc_per_m = 2000 * 28 / (math.tau * 0.10)
     start, end = reader.positions_qc[3][0], reader.positions_qc[3][-1]
     assert (end - start) / qc_per_m == pytest.approx(-4.0, abs=0.04)
+
+
+def test_over_a_serial_line_the_figures_are_driven_at_the_speed_that_its_rate_permits() -> None:
+    parallel, turn = (result.numbers for result in drive(1, None, "4.7", "4.16", bus="rs232"))
+    assert max(numbers["achieved"]["steering_error_deg"] for numbers in (parallel, turn)) <= 1.0
+    assert (parallel["achieved"]["end_x_m"], parallel["achieved"]["end_y_m"]) == pytest.approx((1.0, 1.732), abs=0.06)
+    assert turn["achieved"]["radius_m"] == pytest.approx(turn["commanded"]["radius_m"], rel=0.08)
+    assert 0.8 < turn["commanded"]["speed_m_s"] < 1.0
+    assert turn["line"]["cycle_hz"] > turn["line"]["planned_hz"]
+    assert turn["line"]["own_idle_share"] <= 0.15
 
 
 async def test_the_demo_refuses_a_robot_that_it_cannot_drive() -> None:
