@@ -7,43 +7,25 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from canhelm.errors import CanhelmError, DeviceFault, NotReady, Refused, Timeout
+from canhelm.errors import CanhelmError, DeviceFault, NotReady, Refused
 from drivers.canopen.device import CanopenDevice, Step
 from drivers.canopen.master import Master
 from drivers.canopen.pdo import rpdo_cob_id, tpdo_cob_id
 from drivers.contract import DriveState, Fault, NodeState
-from drivers.epos import moves
+from drivers.epos import device_control, moves
 from drivers.epos.codec import DRIVING_MODES, RPDO1, TPDO1, TPDO1_BYTES, make_rpdo3
-from drivers.epos.configure import ZERO_TARGETS, EposSetup, emergency_words
+from drivers.epos.configure import EposSetup, emergency_words
+from drivers.epos.device_control import drive_state
 from drivers.epos.objects import OBJECTS
 from drivers.epos.outputs import OutputBits
-from drivers.epos.state_machine import Command, Mode, State, controlword_to, state_of
+from drivers.epos.state_machine import Command, Mode, State
 from drivers.epos.transitions import StatuswordWaiters, Turns
+from drivers.epos.travel import Travel
 from drivers.epos.units import WheelUnits
 from profiles.schema import DriveConfig
 
-NEW_REFERENCE_SPEEDS = 3.0
-NEW_REFERENCE_QC = 1000
-"""A position that differs from the last by more than this, beyond what three times the top speed makes in that time, is
-no travel but a new reference (homing, restart)."""
 SENSOR_ERROR = 0x7320
 """Also sent when a setting of the sensor is changed (Firmware Specification 14.1.46): no fault while one configures."""
-_HALF_TURN, _FULL_TURN = 1 << 31, (1 << 32) - 1
-
-_FAULTS = (State.FAULT, State.FAULT_REACTION_DISABLED, State.FAULT_REACTION_ENABLED)
-_DRIVE_STATES: dict[State | None, DriveState] = {
-    **dict.fromkeys(_FAULTS, DriveState.FAULT),
-    State.START: DriveState.DISABLED,
-    State.NOT_READY_TO_SWITCH_ON: DriveState.DISABLED,
-    State.SWITCH_ON_DISABLED: DriveState.DISABLED,
-    State.READY_TO_SWITCH_ON: DriveState.ENABLING,
-    State.SWITCHED_ON: DriveState.ENABLING,
-    State.REFRESH: DriveState.ENABLING,
-    State.MEASURE_INIT: DriveState.ENABLING,
-    State.OPERATION_ENABLED: DriveState.ENABLED,
-    State.QUICK_STOP_ACTIVE: DriveState.QUICK_STOP,
-    None: DriveState.UNKNOWN,
-}
 _unpack_tpdo1, _pack_rpdo1 = TPDO1.unpack, RPDO1.pack
 
 
@@ -79,10 +61,8 @@ class EposDrive(CanopenDevice):
         self.mode = self.driving_mode = DRIVING_MODES[config.mode]
         self.outputs = OutputBits(self.sdo)
         self.on_ready_change: list[Callable[[bool], None]] = []
-        self._units = units = WheelUnits.of(config)
-        self._fastest_qc_s = NEW_REFERENCE_SPEEDS * config.max_speed_m_s / abs(units.m_per_qc)
-        self._raw_qc = self._qc = self._qc_before = 0
-        self._before_s = -math.inf
+        self._units = WheelUnits.of(config)
+        self._travel = Travel(self._units, config.max_speed_m_s)
         self._target_rpm = 0
         self._controlword = int(Command.DISABLE_VOLTAGE)
         self._rpdo1, self._rpdo3 = rpdo_cob_id(1, config.node), rpdo_cob_id(3, config.node)
@@ -99,18 +79,10 @@ class EposDrive(CanopenDevice):
             self.master.counters.malformed += 1
             return
         statusword, raw_qc, current_ma = _unpack_tpdo1(data)
-        moved_qc = ((raw_qc - self._raw_qc + _HALF_TURN) & _FULL_TURN) - _HALF_TURN
-        self._raw_qc = raw_qc
-        last_s = self.reading_time_s
-        if abs(moved_qc) > NEW_REFERENCE_QC + self._fastest_qc_s * (timestamp - last_s) or last_s == -math.inf:
-            moved_qc, self._qc_before, last_s = 0, self._qc, -math.inf
-        qc = self._qc + moved_qc
-        span_s = timestamp - self._before_s
-        if span_s > 0.0:
-            self.speed_m_s = (qc - self._qc_before) * self._units.m_per_qc / span_s
-        self._qc_before, self._before_s = self._qc, last_s
-        self._qc, self.reading_time_s = qc, timestamp
-        self.position_m = qc * self._units.m_per_qc
+        travel = self._travel
+        travel.take(raw_qc, timestamp)
+        self.reading_time_s = timestamp
+        self.position_m, self.speed_m_s = travel.position_m, travel.speed_m_s
         self.current_a = current_ma * 1e-3
         if statusword != self.statusword or self.state is DriveState.UNKNOWN:
             self._on_statusword(statusword)
@@ -149,7 +121,7 @@ class EposDrive(CanopenDevice):
 
     def _on_statusword(self, statusword: int) -> None:
         self.statusword = statusword
-        before, self.state = self.state, _DRIVE_STATES[state_of(statusword)]
+        before, self.state = self.state, drive_state(statusword)
         if self.state is before:
             return
         if self.state is DriveState.FAULT:
@@ -172,19 +144,6 @@ class EposDrive(CanopenDevice):
         self.turns.stop()
         self.waiters.interrupt(error)
 
-    async def _walk_to(self, target: State) -> None:
-        while (state := state_of(self.statusword)) is not target:
-            if self.state is DriveState.FAULT:
-                raise self.device_fault()
-            self.turns.require_unstopped()
-            controlword = None if state is None else controlword_to(target, state)
-            if controlword is not None:
-                self._command(controlword)
-            await self._leave(state, target)
-
-    async def _leave(self, state: State | None, target: State) -> None:
-        await self.waiters.reach(lambda statusword: state_of(statusword) is not state, target.words, target)
-
     # --- commands ------------------------------------------------------------------------------------------------
 
     async def enable(self) -> None:
@@ -202,7 +161,7 @@ class EposDrive(CanopenDevice):
         async with self.turns.take():
             try:
                 await self.enter_mode(self.driving_mode)
-                await self._walk_to(State.OPERATION_ENABLED)
+                await device_control.walk_to(self, State.OPERATION_ENABLED, self._command)
             except (CanhelmError, asyncio.CancelledError):
                 if not self.turns.stopped and self.node_state is NodeState.READY:
                     self._command(Command.DISABLE_VOLTAGE)
@@ -217,7 +176,7 @@ class EposDrive(CanopenDevice):
         off = (DriveState.DISABLED, DriveState.FAULT)
         if self.state not in off:
             await self.waiters.reach(
-                lambda statusword: _DRIVE_STATES[state_of(statusword)] in off,
+                lambda statusword: drive_state(statusword) in off,
                 "power stage off",
                 State.SWITCH_ON_DISABLED,
             )
@@ -242,20 +201,8 @@ class EposDrive(CanopenDevice):
         self.require_ready()
         async with self.turns.take():
             if self.state is DriveState.FAULT:
-                await self._reset_edge()
+                await device_control.reset_fault(self, self._command)
         self.fault = None
-
-    async def _reset_edge(self) -> None:
-        self._command(Command.DISABLE_VOLTAGE)
-        readings = iter((False, True))
-        await self.waiters.reach(lambda _: next(readings), "a cycle with the fault reset bit clear")
-        self._command(Command.FAULT_RESET)
-        try:
-            await self.waiters.reach(lambda statusword: state_of(statusword) not in _FAULTS, "the end of its fault")
-        except Timeout:
-            raise self.device_fault() from None
-        finally:
-            self._command(Command.DISABLE_VOLTAGE)
 
     def device_fault(self) -> DeviceFault:
         """The drive's fault as an error."""
@@ -266,28 +213,9 @@ class EposDrive(CanopenDevice):
     # --- modes ---------------------------------------------------------------------------------------------------
 
     async def enter_mode(self, mode: Mode) -> None:
-        """Write zero targets, then the mode, and prove it.
-
-        Raises:
-            DeviceFault: the drive does not take it.
-            Refused: a stop came in between.
-        """
+        """See :func:`drivers.epos.device_control.enter_mode`."""
         self._drop_target()
-        await self.write(*ZERO_TARGETS)
-        self.turns.require_unstopped()
-        if self.state is DriveState.ENABLED:
-            self._command(Command.ENABLE_OPERATION)
-        await self.write((OBJECTS["mode_of_operation"], mode))
-        found = await self.sdo.read_int(OBJECTS["mode_of_operation_display"])
-        if found != mode:
-            raise DeviceFault(
-                f"{self.who} stays in mode {found} instead of {int(mode)} ({mode.words})",
-                node=self.node,
-                object="0x6061",
-                value=found,
-                limit=int(mode),
-                remedy="try again at rest; switch the drive off and on if that does not help",
-            )
+        await device_control.enter_mode(self, mode, self._command)
         self.mode = mode
 
     async def write(self, *settings: tuple[Any, int]) -> None:
@@ -345,7 +273,8 @@ class EposDrive(CanopenDevice):
 
     def start_steps(self) -> tuple[Step, ...]:
         """Its first reading proves that PDO mapping and SYNC work."""
-        self.reading_time_s = self._before_s = -math.inf
+        self.reading_time_s = -math.inf
+        self._travel.begin_anew()
         return (Step("waiting for its first reading (TPDO1 after SYNC)", self._first_reading),)
 
     async def _first_reading(self) -> None:

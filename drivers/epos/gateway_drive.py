@@ -79,7 +79,7 @@ class GatewayDrive(EposDrive):
         if abs(rpm) != self._written_rpm:
             self._write_velocity(abs(rpm), deadline_s)
         travel_s = ahead_s(self.target_speed_m_s, self._period_s, self.config.acceleration_m_s2)
-        target_qc = self._raw_qc + round(rpm / 60.0 * self._qc_per_turn * travel_s)
+        target_qc = self._travel.raw_qc + round(rpm / 60.0 * self._qc_per_turn * travel_s)
         self._bus.write(OBJECTS["target_position"].index, 0, _int32(target_qc), deadline_s)
         self._write_controlword(Command.ENABLE_OPERATION, deadline_s)
         self._write_controlword(PPM_ABSOLUTE_AT_ONCE, deadline_s)

@@ -5,10 +5,10 @@ RPDO1 goes on meanwhile: its target speed is zero and has no meaning in these mo
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from canhelm.errors import LimitExceeded, Refused
+from drivers.epos.device_control import Commander
 from drivers.epos.objects import OBJECTS
 from drivers.epos.state_machine import HMM_START, PPM_ABSOLUTE_AT_ONCE, PPM_RELATIVE_AT_ONCE, Command, Mode
 
@@ -19,8 +19,6 @@ TARGET_REACHED = 1 << 10
 MODE_BIT = 1 << 12
 """Set-point acknowledged in profile position, homing attained in homing."""
 AT_REST_M_S = 0.02
-
-Commander = Callable[[int], None]
 
 
 def at_target(mode: Mode, statusword: int) -> bool:

@@ -1,0 +1,103 @@
+"""A drive through its states, out of a fault, into a mode (maxon EPOS Firmware Specification 8.1 and 14.1.49)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from canhelm.errors import DeviceFault, Timeout
+from drivers.contract import DriveState
+from drivers.epos.configure import ZERO_TARGETS
+from drivers.epos.objects import OBJECTS
+from drivers.epos.state_machine import Command, Mode, State, controlword_to, state_of
+
+if TYPE_CHECKING:
+    from drivers.epos.drive import EposDrive
+
+Commander = Callable[[int], None]
+
+_FAULTS = (State.FAULT, State.FAULT_REACTION_DISABLED, State.FAULT_REACTION_ENABLED)
+_DRIVE_STATES: dict[State | None, DriveState] = {
+    **dict.fromkeys(_FAULTS, DriveState.FAULT),
+    State.START: DriveState.DISABLED,
+    State.NOT_READY_TO_SWITCH_ON: DriveState.DISABLED,
+    State.SWITCH_ON_DISABLED: DriveState.DISABLED,
+    State.READY_TO_SWITCH_ON: DriveState.ENABLING,
+    State.SWITCHED_ON: DriveState.ENABLING,
+    State.REFRESH: DriveState.ENABLING,
+    State.MEASURE_INIT: DriveState.ENABLING,
+    State.OPERATION_ENABLED: DriveState.ENABLED,
+    State.QUICK_STOP_ACTIVE: DriveState.QUICK_STOP,
+    None: DriveState.UNKNOWN,
+}
+
+
+def drive_state(statusword: int) -> DriveState:
+    """What a statusword means to whoever uses the drive."""
+    return _DRIVE_STATES[state_of(statusword)]
+
+
+async def walk_to(drive: EposDrive, target: State, command: Commander) -> None:
+    """Command one transition after the other until a state is reached.
+
+    Args:
+        command: sends a controlword.
+
+    Raises:
+        DeviceFault: the drive is in fault, or falls into it.
+        Timeout: a transition did not come.
+        Refused: a stop came in between.
+    """
+    while (state := state_of(drive.statusword)) is not target:
+        if drive.state is DriveState.FAULT:
+            raise drive.device_fault()
+        drive.turns.require_unstopped()
+        controlword = None if state is None else controlword_to(target, state)
+        if controlword is not None:
+            command(controlword)
+        await _leave(drive, state, target)
+
+
+async def _leave(drive: EposDrive, state: State | None, target: State) -> None:
+    await drive.waiters.reach(lambda statusword: state_of(statusword) is not state, target.words, target)
+
+
+async def reset_fault(drive: EposDrive, command: Commander) -> None:
+    """Clear a fault by a rising edge of the fault reset bit. Raises DeviceFault where the drive stays in fault."""
+    command(Command.DISABLE_VOLTAGE)
+    readings = iter((False, True))
+    await drive.waiters.reach(lambda _: next(readings), "a cycle with the fault reset bit clear")
+    command(Command.FAULT_RESET)
+    try:
+        await drive.waiters.reach(lambda statusword: state_of(statusword) not in _FAULTS, "the end of its fault")
+    except Timeout:
+        raise drive.device_fault() from None
+    finally:
+        command(Command.DISABLE_VOLTAGE)
+
+
+async def enter_mode(drive: EposDrive, mode: Mode, command: Commander) -> None:
+    """Write zero targets, then the mode, and prove it.
+
+    Args:
+        command: sends a controlword.
+
+    Raises:
+        DeviceFault: the drive does not take it.
+        Refused: a stop came in between.
+    """
+    await drive.write(*ZERO_TARGETS)
+    drive.turns.require_unstopped()
+    if drive.state is DriveState.ENABLED:
+        command(Command.ENABLE_OPERATION)
+    await drive.write((OBJECTS["mode_of_operation"], mode))
+    found = await drive.sdo.read_int(OBJECTS["mode_of_operation_display"])
+    if found != mode:
+        raise DeviceFault(
+            f"{drive.who} stays in mode {found} instead of {int(mode)} ({mode.words})",
+            node=drive.node,
+            object="0x6061",
+            value=found,
+            limit=int(mode),
+            remedy="try again at rest; switch the drive off and on if that does not help",
+        )
