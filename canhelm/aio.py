@@ -92,6 +92,14 @@ class Client:
         finally:
             self._pending.pop(request, None)
 
+    async def status(self) -> dict[str, Any]:
+        """The state of the robot at a glance."""
+        return await self.call("status")
+
+    async def stop(self) -> dict[str, Any]:
+        """Stop everything now; returns when the robot is at rest."""
+        return await self.call("stop")
+
     async def notifications(self, rate_hz: float = 5.0) -> AsyncGenerator[tuple[str, dict[str, Any]], None]:
         """Subscribe, and yield ("status", {...}) at that rate and ("event", {...}) as they come, without end."""
         await self.call("subscribe", rate_hz=rate_hz)

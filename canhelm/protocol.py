@@ -66,7 +66,9 @@ def make_request(request_id: int, method: str, params: dict[str, Any]) -> bytes:
     try:
         return json.dumps(request, separators=(",", ":"), allow_nan=False).encode() + b"\n"
     except (TypeError, ValueError) as error:
-        raise UsageError(f"{method}: {error}", remedy="give finite numbers, strings, lists and mappings") from None
+        endless = [f"{name} is {value}" for name, value in params.items() if value != _finite(value)]
+        reason = f"{', '.join(endless)}: not a finite number" if endless else str(error)
+        raise UsageError(f"{method}: {reason}", remedy="give finite numbers, strings, lists and mappings") from None
 
 
 def make_result(request_id: int | str | None, result: dict[str, Any]) -> bytes:
@@ -89,8 +91,14 @@ def parse_message(line: bytes) -> dict[str, Any] | str:
     """The message in a line, or the reason why there is none."""
     try:
         message = json.loads(line.decode(), parse_constant=_refuse_constant)
-    except (ValueError, RecursionError) as error:
-        return f"not JSON: {type(error).__name__}"
+    except UnicodeDecodeError as error:
+        return f"not JSON: byte {error.start} is not UTF-8"
+    except json.JSONDecodeError as error:
+        return f"not JSON: {error.msg[:1].lower()}{error.msg[1:]} at character {error.pos}"
+    except ValueError as error:
+        return f"not JSON: {error}"
+    except RecursionError:
+        return "not JSON: it is nested too deeply"
     return message if isinstance(message, dict) else "not a JSON object"
 
 
@@ -212,10 +220,15 @@ def open_socket(path: str | os.PathLike[str], timeout_s: float = 5.0) -> socket.
     except OSError as error:
         connection.close()
         raise DaemonNotRunning(
-            f"no daemon answers on {os.fspath(path)}: {error.strerror or error}",
-            remedy="start it: canhelm run --profile NAME (add --simulate without hardware), or systemctl start canhelm",
+            f"no daemon answers on {os.fspath(path)}: {error.strerror or error}", remedy=_how_to_start(Path(path))
         ) from None
     return connection
+
+
+def _how_to_start(path: Path) -> str:
+    if path.parent in (SYSTEM_FOLDER, user_folder()):
+        return "start it: canhelm run --profile NAME (add --simulate without hardware), or systemctl start canhelm"
+    return f"start it: canhelm run --profile NAME --socket {path} (add --simulate without hardware)"
 
 
 def _refused(path: str | os.PathLike[str]) -> PermissionRefused:

@@ -1,7 +1,36 @@
-"""``python -m daemon`` is the command ``canhelm``."""
+"""``python -m daemon`` is the command ``canhelm``: where the process begins."""
 
+from __future__ import annotations
+
+import os
+import signal
 import sys
 
-from daemon.cli.main import main
+INTERRUPTED = 130
 
-sys.exit(main())
+
+def main() -> int:
+    """Run the command line of this process; Ctrl-C and SIGTERM end it in order, even while it is being loaded.
+
+    Returns:
+        The exit code.
+    """
+    try:
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        _replace_closed_outputs()
+        from daemon.cli.main import main as run
+
+        return run()
+    except KeyboardInterrupt:
+        return INTERRUPTED
+
+
+def _replace_closed_outputs() -> None:
+    """Python has no stdout or stderr where the shell has closed it (``>&-``): nobody wants what is written there."""
+    nowhere = os.fdopen(os.open(os.devnull, os.O_WRONLY), "w")
+    sys.stdout = sys.stdout or nowhere
+    sys.stderr = sys.stderr or nowhere
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -74,6 +74,8 @@ class Method:
         needs_lease: it moves something, and the motion belongs to the connection that asked for it.
         one_of: exactly one of these parameters must be given.
         ends_by: the parameter without which the motion has no end (and cannot be handed to the daemon).
+        urgent: it stops the robot: it is carried out whatever else is under way, and without parameters that make no
+            sense instead of being refused.
     """
 
     name: str
@@ -84,6 +86,7 @@ class Method:
     needs_lease: bool = False
     one_of: tuple[str, ...] = ()
     ends_by: str | None = None
+    urgent: bool = False
 
     def schema(self) -> dict[str, Any]:
         """The method for ``api.schema``."""
@@ -137,13 +140,14 @@ _TALK = (
 )
 
 _WHOLE = (
-    Method("stop", "Stop everything now; answers at rest. Needs no lease.", (), "state", Role.WATCH),
+    Method("stop", "Stop everything now; answers at rest. Needs no lease.", (), "state", Role.WATCH, urgent=True),
     Method(
         "estop",
         "Emergency stop: quick stop, disable, latched until reset. Needs no lease.",
         (Param("reason", "string", "why, for people", default="commanded by a person"),),
         "state, message",
         Role.WATCH,
+        urgent=True,
     ),
     Method("reset", "Clear a latched emergency stop and faults.", (), "state, message"),
 )
@@ -397,6 +401,8 @@ def validate(method: Method, params: dict[str, Any]) -> dict[str, Any]:
         UsageError: an unknown, missing, mistyped or out of range parameter, named in ``object``.
     """
     known = {param.name: param for param in method.params}
+    if method.urgent:
+        params = {name: value for name, value in params.items() if name in known and _fits(known[name], value)}
     for name in params:
         if name not in known:
             has = ", ".join(known) or "no parameters"
@@ -423,7 +429,7 @@ def _check(method: Method, param: Param, params: dict[str, Any]) -> Any:
         return param.default
     fits, wanted = _TYPES[param.type]
     if not fits(value):
-        raise _wrong(method, param.name, "is of the wrong type", value, f"give {wanted}")
+        raise _wrong(method, param.name, f"is not {wanted}", value, f"give {wanted}: {param.doc}")
     if param.choices and value not in param.choices:
         raise _wrong(method, param.name, "is none of its values", value, f"give {', '.join(param.choices)}")
     if param.type in ("number", "integer"):
@@ -431,11 +437,19 @@ def _check(method: Method, param: Param, params: dict[str, Any]) -> Any:
     return value
 
 
+def _fits(param: Param, value: Any) -> bool:
+    return _TYPES[param.type][0](value)
+
+
 def _check_range(method: Method, param: Param, value: float) -> None:
     low, high = param.minimum, param.maximum
     if (low is not None and value < low) or (high is not None and value > high):
-        limit = f"{'' if low is None else f'{low:g}'} .. {'' if high is None else f'{high:g}'} {param.unit}".strip()
+        limit = f"{_digits(low)} .. {_digits(high)} {param.unit}".strip()
         raise _wrong(method, param.name, "is out of range", value, f"stay within {limit}", limit)
+
+
+def _digits(bound: float | None) -> str:
+    return "" if bound is None else f"{bound:.12g}"
 
 
 def _wrong(method: Method, name: str, what: str, value: Any, remedy: str, limit: str | None = None) -> UsageError:
@@ -470,7 +484,7 @@ def _is_node(value: Any) -> bool:
 
 
 _TYPES: dict[str, tuple[Callable[[Any], bool], str]] = {
-    "number": (_is_number, "a finite number"),
+    "number": (_is_number, "a number from -1e15 to 1e15"),
     "integer": (_is_integer, "an integer"),
     "boolean": (lambda value: isinstance(value, bool), "true or false"),
     "string": (_is_text, "a string of 1 to 256 printable characters"),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
-from daemon.cli.options import DEFAULT, Options, Pair
+from daemon.cli.options import DEFAULT, Brakes, Options
 from daemon.cli.output import show, words
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def _table(data: Mapping[str, Any]) -> Table:
 
 
 @app.command
-def engage(pair: Pair = "all", /, *, options: Options = DEFAULT) -> None:
+def engage(pair: Brakes = "all", /, *, options: Options = DEFAULT) -> None:
     """Engage brakes; on the MAX2D they lock the direction of a wheel pair.
 
     Example: `canhelm brake engage all`
@@ -43,7 +43,7 @@ def engage(pair: Pair = "all", /, *, options: Options = DEFAULT) -> None:
 
 @app.command
 def release(
-    pair: Pair = "all", /, *, force: Annotated[bool, Parameter(negative=())] = False, options: Options = DEFAULT
+    pair: Brakes = "all", /, *, force: Annotated[bool, Parameter(negative=())] = False, options: Options = DEFAULT
 ) -> None:
     """Release brakes.
 
@@ -58,7 +58,7 @@ def release(
 
 
 @app.command
-def status(pair: Pair = "all", /, *, options: Options = DEFAULT) -> None:
+def status(pair: Brakes = "all", /, *, options: Options = DEFAULT) -> None:
     """State of brakes.
 
     Example: `canhelm brake status`

@@ -8,17 +8,16 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
-from cyclopts import App, CycloptsError, Group
-from cyclopts.config import Env
+from cyclopts import App, CoercionError, CycloptsError, Group, Token
 
 from canhelm import __version__
-from canhelm.errors import CanhelmError
+from canhelm.errors import CanhelmError, UsageError
 from daemon.cli.output import say, say_error
 
 if TYPE_CHECKING:
-    from cyclopts import ArgumentCollection
+    from cyclopts import Argument, ArgumentCollection
 
 INTERRUPTED = 130
 
@@ -65,15 +64,43 @@ COMMANDS: dict[Group, dict[str, str]] = {
     },
 }
 """Commands by group, in the order of the help; module and function (or a noun's own app) of each."""
+NOUNS = {name for commands in COMMANDS.values() for name, path in commands.items() if path.endswith(":app")}
+"""Commands that do nothing without another word."""
 
 
-class OptionEnv(Env):
-    """``CANHELM_OPTION`` for every option; arguments come from the command line alone."""
+URGENT = (("stop",), ("estop",))
+"""Commands that no bad value in the environment keeps from being carried out."""
+ENVIRONMENT = "CANHELM_"
 
-    def __call__(self, app: App, commands: tuple[str, ...], arguments: ArgumentCollection) -> None:
-        """Fill options that the command line did not give."""
-        options = [argument for argument in arguments if argument.name.startswith("--")]
-        super().__call__(app, commands, type(arguments)(options))
+
+def from_environment(app: App, commands: tuple[str, ...], arguments: ArgumentCollection) -> None:
+    """``CANHELM_OPTION`` for every option that the command line did not give; an empty one counts as not given."""
+    for argument in arguments:
+        variable = ENVIRONMENT + argument.name.removeprefix("--").upper().replace("-", "_")
+        value = os.environ.get(variable)
+        if not value or argument.tokens or not argument.name.startswith("--"):
+            continue
+        argument.append(Token(keyword=variable, value=value, source="env"))
+        if commands in URGENT and not _is_valid(argument):
+            argument.tokens.clear()
+            say(f"{variable}={value} makes no sense and is ignored")
+
+
+def _is_valid(argument: Argument) -> bool:
+    try:
+        argument.convert()
+    except CoercionError:
+        return False
+    return True
+
+
+def refuse_fractions(app: App, commands: tuple[str, ...], arguments: ArgumentCollection) -> None:
+    """Raise CoercionError for a fraction where a whole number is asked for; cyclopts would round it."""
+    for argument in arguments:
+        if int in (argument.hint, *get_args(argument.hint)):
+            for token in argument.tokens:
+                if "." in token.value:
+                    raise CoercionError(argument=argument, token=token, target_type=int)
 
 
 def build_app() -> App:
@@ -85,7 +112,7 @@ def build_app() -> App:
         "Example: `canhelm drive turn --rear -15 --front 15 --speed 0.4 --duration 5`",
         help_format="markdown",
         version=__version__,
-        config=OptionEnv("CANHELM_", command=False, show=False),
+        config=(from_environment, refuse_fractions),
         suppress_keyboard_interrupt=False,
     )
     for flag in ("--help", "--version"):
@@ -118,10 +145,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         say("interrupted")
         return INTERRUPTED
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except (BrokenPipeError, SystemExit):  # rich ends the process where its reader has hung up
+        _throw_output_away()
         return 0
+    except OSError as error:
+        _throw_output_away()
+        say(f"cannot write {error.filename or 'the output'}: {error.strerror or error}")
+        return CanhelmError.exit_code
     return code
+
+
+def _throw_output_away() -> None:
+    """What is still buffered cannot be written either; Python would try once more at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _run(argv: Sequence[str]) -> int:
@@ -129,6 +165,8 @@ def _run(argv: Sequence[str]) -> int:
     if not argv or argv[0] in app.help_flags:
         _load_all(app)
     result = app(list(argv), exit_on_error=False, print_error=False, result_action="return_value")
+    if len(argv) == 1 and argv[0] in NOUNS:
+        return UsageError.exit_code  # it has shown its help
     return result if isinstance(result, int) else 0
 
 

@@ -14,7 +14,7 @@ from canhelm.errors import UsageError
 from daemon.cli.output import Json
 
 Node = Annotated[str, Parameter(help="Node id (1 to 127) or a name from the profile (front_left).")]
-Pair = Annotated[str, Parameter(help="front, rear or all.")]
+Brakes = Annotated[str, Parameter(help="front, rear or all.")]
 NoWait = Annotated[bool, Parameter(name="--no-wait", negative=(), help="Hand the motion to the daemon; print its id.")]
 
 

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+from cyclopts import Parameter
+
 from daemon.cli.motion import run_motion
-from daemon.cli.options import DEFAULT, NoWait, Options, Pair
+from daemon.cli.options import DEFAULT, NoWait, Options
+
+Pair = Annotated[str, Parameter(help="front or rear.")]
 
 
 def steer(pair: Pair, angle_deg: float, /, *, no_wait: NoWait = False, options: Options = DEFAULT) -> int:

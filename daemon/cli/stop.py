@@ -26,7 +26,13 @@ def estop(*, reason: str | None = None, options: Options = DEFAULT) -> None:
         Why, for those who read the status later.
     """
     with options.client() as client:
-        show(client.call("estop", reason=reason), json=options.json)
+        show(client.call("estop", reason=_one_line(reason)), json=options.json)
+
+
+def _one_line(reason: str | None) -> str | None:
+    """A reason as the daemon takes it: one line, not too long."""
+    words = "".join(letter if letter.isprintable() else " " for letter in reason or "").split()
+    return " ".join(words)[:256] or None
 
 
 def reset(*, options: Options = DEFAULT) -> None:

@@ -63,13 +63,7 @@ class MotorCommands:
             speed = drive.speed_from_rpm(float(params["velocity_rpm"]))
         limit = self._supervisor.vehicle.wheel_limit_m_s(drive.name)
         if not abs(speed) <= limit:
-            raise LimitExceeded(
-                f"{abs(drive.rpm_from_speed(speed)):.0f} rpm is beyond the limit of {drive.name}",
-                node=drive.node,
-                value=round(abs(drive.rpm_from_speed(speed)), 1),
-                limit=f"{abs(drive.rpm_from_speed(limit)):.0f} rpm at the motor, {limit:g} m/s at the wheel",
-                remedy="ask for less, or raise the limit in the profile",
-            )
+            raise _too_fast(drive, drive.rpm_from_speed(speed), limit)
         duration = params.get("duration_s")
         held = holder(params, lease, endless=duration is None)
         wheel, count = self._supervisor.vehicle.wheel_of(drive.name)
@@ -82,7 +76,7 @@ class MotorCommands:
         speed_rpm = float(params.get("velocity_rpm") or abs(drive.rpm_from_speed(0.1)))
         limit = self._supervisor.vehicle.wheel_limit_m_s(drive.name)
         if abs(drive.speed_from_rpm(speed_rpm)) > limit:
-            raise LimitExceeded(f"{speed_rpm:g} rpm is beyond the limit of {drive.name}", node=drive.node, limit=limit)
+            raise _too_fast(drive, speed_rpm, limit)
 
         async def command() -> None:
             relative = bool(params.get("relative", False))
@@ -112,6 +106,7 @@ class MotorCommands:
                 node=drive.node,
                 value=params["current_ma"],
                 limit=f"{limit_a * 1000:.0f} mA",
+                remedy="ask for less, or raise the motor's continuous current in the profile",
             )
         duration = params.get("duration_s")
         held = holder(params, lease, endless=duration is None)
@@ -160,3 +155,13 @@ class MotorCommands:
         for motion in self._motions_of(drive):
             motion.stop(f"stop of {drive.name} was commanded")
         await self._supervisor.until_rest()
+
+
+def _too_fast(drive: Drive, velocity_rpm: float, limit_m_s: float) -> LimitExceeded:
+    return LimitExceeded(
+        f"{abs(velocity_rpm):.0f} rpm is beyond the limit of {drive.name}",
+        node=drive.node,
+        value=round(abs(velocity_rpm), 1),
+        limit=f"{abs(drive.rpm_from_speed(limit_m_s)):.0f} rpm at the motor, {limit_m_s:g} m/s at the wheel",
+        remedy="ask for less, or raise the limit in the profile",
+    )

@@ -202,3 +202,10 @@ async def test_the_asyncio_client_hears_of_a_daemon_that_goes_away(backend: Fake
     with pytest.raises(DaemonNotRunning):
         await moving
     await client.close()
+
+
+@pytest.mark.real_time
+async def test_the_asynchronous_client_has_the_same_shorthands(server: Server, backend: FakeBackend) -> None:
+    async with aio.Client(server.path) as client:
+        assert (await client.status())["robot"] == "fake"
+        assert await client.stop() == {"state": "idle"}

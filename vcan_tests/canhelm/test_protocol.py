@@ -145,3 +145,27 @@ def test_where_none_runs_the_remedy_starts_one(folder: Path) -> None:
     with pytest.raises(DaemonNotRunning) as caught:
         protocol.choose_socket()
     assert "canhelm run" in str(caught.value.remedy)
+
+
+REASONS = [
+    (b"\xff\xfe", "not JSON: byte 0 is not UTF-8"),
+    (b"{", "not JSON: expecting property name enclosed in double quotes at character 1"),
+    (b'{"a": NaN}', "not JSON: NaN is not JSON"),
+    (b"[" * 60_000, "not JSON: it is nested too deeply"),
+]
+
+
+@pytest.mark.parametrize(("line", "reason"), REASONS, ids=["bytes", "syntax", "NaN", "depth"])
+def test_the_reason_why_a_line_is_no_json_is_in_words(line: bytes, reason: str) -> None:
+    assert protocol.parse_message(line) == reason
+
+
+def test_a_number_that_json_cannot_carry_is_named() -> None:
+    with pytest.raises(UsageError, match="steer: angle_deg is nan: not a finite number"):
+        protocol.make_request(1, "steer", {"pair": "front", "angle_deg": math.nan})
+
+
+def test_the_way_to_start_a_daemon_names_the_socket_that_was_asked_for(tmp_path: Path) -> None:
+    with pytest.raises(DaemonNotRunning) as missing:
+        protocol.open_socket(tmp_path / "here.sock")
+    assert f"--socket {tmp_path / 'here.sock'}" in str(missing.value)

@@ -110,6 +110,13 @@ CODES = [
     ("steer front 500", 2, "-180"),
     ("nmt start 0", 2, "1 to 127"),
     ("status --colour", 2, "--colour"),
+    ("motor position 1 0.5", 2, "0.5"),
+    ("motor position 1 0.9 --relative", 2, "0.9"),
+    ("motor home 1 --method 1.5", 2, "1.5"),
+    ("demo --seed 1.9", 2, "1.9"),
+    ("steer front inf", 2, "angle_deg is inf: not a finite number"),
+    ("steer front 1e30", 2, "angle_deg (1e+30) is not a number from -1e15 to 1e15"),
+    ("motor position 1 9876543210", 2, "stay within -2147483648 .. 2147483647 qc"),
     ("motor enable 7", 4, "node 7 does not answer - check its power"),
     ("motor enable 9", 6, "emergency stop"),
 ]
@@ -134,6 +141,33 @@ def test_without_a_daemon_the_exit_code_is_3(capsys: pytest.CaptureFixture[str],
 def test_a_daemon_that_is_gone_from_its_socket_is_exit_code_3(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("status --socket /nonexistent/robot.sock") == 3
     assert "/nonexistent/robot.sock" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("noun", ["drive", "motor", "sdo"])
+def test_a_noun_alone_shows_its_help_and_is_wrong_usage(capsys: pytest.CaptureFixture[str], noun: str) -> None:
+    assert run(noun) == 2
+    assert f"Usage: canhelm {noun} COMMAND" in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("server")
+def test_an_option_that_is_empty_in_the_environment_counts_as_not_given(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CANHELM_JSON", "")
+    assert run("status") == 0
+
+
+@pytest.mark.parametrize("command", ["stop", "estop"])
+def test_nothing_in_the_environment_keeps_anybody_from_stopping(
+    server: Server, backend: FakeBackend, monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    monkeypatch.setenv("CANHELM_JSON", "maybe")
+    assert (run("status"), run(command)) == (2, 0)
+    assert [method for method, _, _ in backend.calls] == [command]
+
+
+def test_a_long_reason_of_several_lines_still_stops_the_robot(server: Server, backend: FakeBackend) -> None:
+    assert main(["estop", "--reason", "a person\n\x1b[1m" + "!" * 500]) == 0
+    reason = backend.calls[-1][1]["reason"]
+    assert (reason[:9], len(reason), reason.isprintable()) == ("a person ", 256, True)
 
 
 # -- what is printed --------------------------------------------------------------------------------------------------
@@ -175,6 +209,29 @@ def test_status_loads_none_of_the_daemons_libraries(server: Server) -> None:
     assert not loaded & {"can", "canopen", "numpy", "msgspec", "yaml", "rich", "drivers", "profiles"}
 
 
+@pytest.mark.parametrize("line", ["--help", "completion bash"])
+def test_a_full_disk_is_one_sentence(line: str) -> None:
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([sys.executable, "-m", "daemon", *line.split()], stdout=full, stderr=subprocess.PIPE)
+    assert done.returncode == 1
+    assert done.stderr.decode() == "canhelm: cannot write the output: No space left on device\n"
+
+
+def test_who_reads_only_the_first_line_of_the_help_gets_no_failure(tmp_path: Path) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run([sys.executable, "-m", "daemon", "--help"], stdout=writing, stderr=subprocess.PIPE)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-"])
+def test_closed_outputs_fail_nothing(server: Server, backend: FakeBackend, closed: str) -> None:
+    done = subprocess.run(f"{sys.executable} -m daemon stop {closed}", shell=True, capture_output=True)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert backend.calls[-1][0] == "stop"
+
+
 # -- interruption -----------------------------------------------------------------------------------------------------
 
 
@@ -198,6 +255,31 @@ def test_an_interrupted_monitor_leaves_the_robot_alone(server: Server, backend: 
         process.send_signal(signal.SIGINT)
         assert process.wait(10) == 130
     assert not backend.calls
+
+
+@pytest.mark.parametrize("line", ["status --follow --rate 50", "monitor --rate 50"])
+def test_sigterm_ends_a_command_in_order(server: Server, line: str) -> None:
+    with canhelm(line) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.readline()
+        process.terminate()
+        assert (process.wait(10), process.stderr.read()) == (130, "canhelm: interrupted\n")
+
+
+def test_an_interruption_while_the_command_is_loaded_is_no_traceback(capsys: pytest.CaptureFixture[str]) -> None:
+    code = (
+        "import builtins, signal, sys\n"
+        "from daemon.__main__ import main\n"
+        "load = builtins.__import__\n"
+        "def interrupt(name, *rest):\n"
+        "    if name.startswith('cyclopts'): signal.raise_signal(signal.SIGINT)\n"
+        "    return load(name, *rest)\n"
+        "builtins.__import__ = interrupt\n"
+        "sys.exit(main())\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code, "status"], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (130, "")
 
 
 # -- help -------------------------------------------------------------------------------------------------------------
@@ -224,6 +306,28 @@ def test_day_to_day_verbs_come_first_in_the_help(capsys: pytest.CaptureFixture[s
 def test_completion_knows_the_verbs(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(f"completion {shell}") == 0
     assert "quick-stop" in capsys.readouterr().out
+
+
+def test_an_installed_completion_says_which_startup_file_it_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert run("completion bash --install") == 0
+    assert "~/.bashrc loads it" in capsys.readouterr().err
+    assert "canhelm" in (tmp_path / ".bashrc").read_text()
+
+
+def test_a_completion_that_cannot_be_installed_tells_the_way_by_hand(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("HOME", "/proc/nowhere")
+    assert run("completion bash --install") == 7
+    assert "canhelm completion bash > FILE" in capsys.readouterr().err
+
+
+def test_the_help_of_steer_promises_only_what_steers(capsys: pytest.CaptureFixture[str]) -> None:
+    run("steer --help")
+    assert "rear or all" not in capsys.readouterr().out
 
 
 def test_version_names_the_api(capsys: pytest.CaptureFixture[str]) -> None:
