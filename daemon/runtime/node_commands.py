@@ -15,6 +15,7 @@ from daemon.runtime.supervisor import Supervisor
 from drivers.canopen.codes import NmtCommand
 from drivers.canopen.lss import Identity, LssMaster, parse_identity
 from drivers.canopen.scan import IDENTITY, FoundNode, NodeScan
+from drivers.contract import NodeState
 from drivers.epos.commissioning import Commissioning
 from drivers.epos.drive import EposDrive
 
@@ -61,13 +62,24 @@ class NodeCommands:
     async def _scan(self, params: Params, lease: str | None) -> dict[str, Any]:
         first, last = params["first"], params["last"]
         master = self._supervisor.master
-        found = await NodeScan(master, QUICK_S).run(first, last)
+        found = await self._ask(range(first, last + 1))
         entries = [node_entry(each, await self._firmware(each)) for each in found]
         silent = set(self._supervisor.devices.by_node) - {each.node for each in found}
         missing = sorted(node for node in silent if first <= node <= last)
         entries += [missing_entry(node, master.names[node]) for node in missing]
         remark = bit_rate_remark(master.bus, bool(found), [master.who(node) for node in missing])
         return {"nodes": sorted(entries, key=lambda entry: int(entry["node"])), "remarks": [remark] if remark else []}
+
+    async def _ask(self, nodes: range) -> list[FoundNode]:
+        """Over a gateway each silent node id blocks the line for its time-out: ask those that are there."""
+        master = self._supervisor.master
+        if master.network.synchronous:
+            return await NodeScan(master, QUICK_S).run(nodes)
+        require_all_disabled(self._supervisor)
+        there = {
+            n for n, device in self._supervisor.devices.by_node.items() if device.node_state is not NodeState.ABSENT
+        }
+        return await NodeScan(master, master.network.sdo_timeout_s, at_once=1).run([n for n in nodes if n in there])
 
     async def _firmware(self, found: FoundNode) -> str:
         for address, applies, words in FIRMWARE:
@@ -117,8 +129,13 @@ class NodeCommands:
 
     # --- LSS -----------------------------------------------------------------------------------------------------
 
-    async def _lss_find(self, params: Params, lease: str | None) -> dict[str, Any]:
+    def _require_lss(self) -> None:
         require_all_disabled(self._supervisor)
+        if not self._supervisor.master.network.synchronous:
+            raise Refused("LSS does not pass the RS-232 gateway of an EPOS", remedy="connect a CAN adapter for it")
+
+    async def _lss_find(self, params: Params, lease: str | None) -> dict[str, Any]:
+        self._require_lss()
         lss = self._supervisor.master.lss
         async with self._lss_turn:
             try:
@@ -133,6 +150,7 @@ class NodeCommands:
         return {"identity": str(identity), **identity._asdict()}
 
     async def _lss_set_node_id(self, params: Params, lease: str | None) -> dict[str, Any]:
+        self._require_lss()
         new = int(params["node_id"])
         _require_confirmation(params, f"{params['device']} becomes node {new} for good")
         if await self._is_there(new):
@@ -155,6 +173,7 @@ class NodeCommands:
         )
 
     async def _lss_set_bit_rate(self, params: Params, lease: str | None) -> dict[str, Any]:
+        self._require_lss()
         bit_rate = int(params["bit_rate"])
         _require_confirmation(params, f"{params['device']} gets {bit_rate} bit/s for good")
 
@@ -167,7 +186,6 @@ class NodeCommands:
 
     async def _set_up(self, device: str, change: Callable[[LssMaster], Awaitable[None]]) -> int | None:
         """Change and store something in one device; its node id before, or None where it was named by its identity."""
-        require_all_disabled(self._supervisor)
         identity, node = parse_identity(device), None
         if identity is None:
             node = self._number(int(device, 0) if device.lower().startswith("0x") else device)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from canhelm.errors import Aborted, NodeAbsent, Timeout
@@ -154,20 +155,21 @@ class NodeScan:
     Args:
         master: the master of the bus; its nodes go on as they are.
         timeout_s: how long each node may take to answer.
+        at_once: nodes that are asked at the same time; 1 where each silent one holds up the others.
     """
 
-    def __init__(self, master: Master, timeout_s: float = 0.1) -> None:
+    def __init__(self, master: Master, timeout_s: float = 0.1, at_once: int = ASKED_AT_ONCE) -> None:
         self._master = master
         self._timeout_s = timeout_s
+        self._at_once = at_once
         self._watch = BusWatch(master.bus)
 
-    async def run(self, first: int = 1, last: int = 127) -> list[FoundNode]:
-        """Ask every node id of a range, describe those that answer, and ask for their states.
+    async def run(self, nodes: Sequence[int] = range(1, 128)) -> list[FoundNode]:
+        """Ask node ids, describe those that answer, and ask for their states.
 
         Nodes that keep silent are asked for their state, too: a stopped node answers nothing else. One that would
         watch for the master's guarding from then on is not asked, unless the master guards it anyway.
         """
-        nodes = range(first, last + 1)
         with self._watch:
             answering = await self._answering(nodes)
             found = [await self._describe(node) for node in answering]
@@ -176,10 +178,10 @@ class NodeScan:
         found += [FoundNode(node, self._name(node), False, {}, "", "", self._watch.of(node)) for node in heard]
         return sorted(found, key=lambda each: each.node)
 
-    async def _answering(self, nodes: range) -> list[int]:
+    async def _answering(self, nodes: Sequence[int]) -> list[int]:
         answering: list[int] = []
-        for start in range(0, len(nodes), ASKED_AT_ONCE):
-            group = nodes[start : start + ASKED_AT_ONCE]
+        for start in range(0, len(nodes), self._at_once):
+            group = nodes[start : start + self._at_once]
             answers = await asyncio.gather(*(self._answers(node) for node in group))
             answering += [node for node, answered in zip(group, answers, strict=True) if answered]
         return answering
@@ -215,9 +217,9 @@ class NodeScan:
         return not (any(await self._read(node, (0x100C, 0))) and any(await self._read(node, (0x100D, 0))))
 
     async def _ask_states(self, nodes: list[int]) -> None:
-        for start in range(0, len(nodes), ASKED_AT_ONCE):
+        for start in range(0, len(nodes), self._at_once):
             deadline_s = asyncio.get_running_loop().time() + self._timeout_s
-            for node in nodes[start : start + ASKED_AT_ONCE]:
+            for node in nodes[start : start + self._at_once]:
                 self._master.bus.send(RTR_FLAG | ERROR_CONTROL_COB_ID + node, b"", deadline_s)
             await asyncio.sleep(self._timeout_s)
 

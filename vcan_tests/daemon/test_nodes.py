@@ -113,6 +113,25 @@ async def test_a_healthy_bus_gets_no_remark() -> None:
         assert (await robot.call("nodes.scan", first=1, last=10))["remarks"] == []
 
 
+async def test_over_rs232_a_scan_at_rest_lists_the_nodes_and_loses_none() -> None:
+    async with running_robot(bus="rs232") as robot:
+        nodes = await scan(robot, first=1, last=8)
+        assert {node: entry["device"] for node, entry in nodes.items()} == {
+            **dict.fromkeys((1, 2, 3, 4), "EPOS"),
+            **dict.fromkeys((5, 6), "CiA 406 encoder"),
+        }
+        assert {entry["remark"] for entry in nodes.values()} == {""}
+        assert robot.state == "idle"
+
+
+async def test_over_rs232_a_scan_is_refused_while_a_drive_is_enabled() -> None:
+    async with running_robot(bus="rs232") as robot:
+        await robot.call("motor.enable", node=1)
+        with pytest.raises(Interlock):
+            await scan(robot, first=1, last=8)
+        await robot.call("motor.disable", node=1)
+
+
 # --- memory of nodes -------------------------------------------------------------------------------------------------
 
 
@@ -201,6 +220,12 @@ async def test_a_drive_has_no_lss_and_the_answer_says_where_its_id_comes_from() 
 async def test_where_nobody_is_without_an_id_nobody_is_found() -> None:
     async with running_robot() as robot:
         with pytest.raises(NodeAbsent, match="without a node id"):
+            await robot.call("lss.find")
+
+
+async def test_over_rs232_there_is_no_lss() -> None:
+    async with running_robot(bus="rs232") as robot:
+        with pytest.raises(Refused, match="RS-232"):
             await robot.call("lss.find")
 
 

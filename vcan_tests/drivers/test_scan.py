@@ -47,7 +47,7 @@ async def test_a_scan_of_a_range_asks_nobody_else() -> None:
     async with bench() as b:
         asked: set[int] = set()
         b.intruder.taps.append(lambda can_id, data, stamp: asked.add(can_id))
-        assert [found.node for found in await NodeScan(b.master).run(5, 9)] == [5, 6]
+        assert [found.node for found in await NodeScan(b.master).run(range(5, 10))] == [5, 6]
         assert {can_id & 0x7F for can_id in asked if can_id & 0x780 == 0x600} == {5, 6, 7, 8, 9}
 
 
@@ -65,7 +65,7 @@ async def test_a_stopped_node_is_found_by_its_guarding_answer() -> None:
         await asyncio.sleep(0.1)
         b.intruder.send(0x000, bytes((2, 40)))
         await asyncio.sleep(0.001)
-        found = (await NodeScan(b.master).run(40, 40))[0]
+        found = (await NodeScan(b.master).run([40]))[0]
         assert (found.answers, found.sighting.state) == (False, NmtState.STOPPED)
 
 
@@ -83,7 +83,7 @@ async def test_a_scan_does_not_start_the_life_guarding_of_a_node_that_nobody_gua
         await asyncio.sleep(0.1)
         requests: list[int] = []
         b.intruder.taps.append(lambda can_id, data, stamp: requests.append(can_id))
-        assert [found.sighting.state for found in await NodeScan(b.master).run(40, 40)] == [None]
+        assert [found.sighting.state for found in await NodeScan(b.master).run([40])] == [None]
         assert 0x728 | RTR_FLAG not in requests
 
 
