@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Any
 
 from canhelm import protocol
-from canhelm.errors import DaemonNotRunning, Timeout
+from canhelm.errors import CanhelmError, DaemonNotRunning, Timeout
 
 _KEPT_NOTIFICATIONS = 256
 
@@ -32,6 +32,7 @@ class Client:
         self._notifications: asyncio.Queue[tuple[str, dict[str, Any]] | None] = asyncio.Queue()
         self._last_id = 0
         self._unanswered = 0
+        self._farewell: Exception | None = None
         self._writer: asyncio.StreamWriter | None = None
         self._reading: asyncio.Task[None] | None = None
         self._renewing: asyncio.TimerHandle | None = None
@@ -105,11 +106,11 @@ class Client:
         await self.call("subscribe", rate_hz=rate_hz)
         while (notification := await self._notifications.get()) is not None:
             yield notification
-        raise _gone()
+        raise self._farewell or _gone()
 
     def _send(self, method: str, params: dict[str, Any]) -> int:
         if self._writer is None or self._reading is None or self._reading.done():
-            raise _gone()
+            raise self._farewell or _gone()
         self._last_id += 1
         self._writer.write(protocol.make_request(self._last_id, method, params))
         return self._last_id
@@ -131,11 +132,14 @@ class Client:
                 self._unanswered = 0
                 message = protocol.parse_message(line)
                 if isinstance(message, dict):
+                    protocol.check_farewell(message)
                     self._take(message)
+        except CanhelmError as error:
+            self._farewell = error
         except (OSError, ValueError):
             pass  # a broken pipe and an endless line end the connection like a hang-up
         finally:
-            self._fail(_gone())
+            self._fail(self._farewell or _gone())
             self._notifications.put_nowait(None)
 
     def _take(self, message: dict[str, Any]) -> None:

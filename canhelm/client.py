@@ -100,8 +100,7 @@ class Client:
         except TimeoutError:
             raise self._hung() from None
         except OSError:
-            if method != "lease.renew":
-                raise self._gone() from None
+            pass  # it has hung up: reading tells why
         return self._last_id
 
     def _next_message(self) -> dict[str, Any]:
@@ -112,6 +111,7 @@ class Client:
                 message = protocol.parse_message(bytes(self._received[:end]))
                 del self._received[: end + 1]
                 if isinstance(message, dict):
+                    protocol.check_farewell(message)
                     return message
             elif len(self._received) > protocol.MAX_ANSWER_BYTES:
                 raise self._gone()

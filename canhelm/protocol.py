@@ -119,6 +119,12 @@ def result_of(answer: dict[str, Any]) -> dict[str, Any]:
     return result if isinstance(result, dict) else {}
 
 
+def check_farewell(message: dict[str, Any]) -> None:
+    """Raise the CanhelmError that belongs to no request: what a daemon says before it hangs up."""
+    if "error" in message and message.get("id") is None:
+        result_of(message)
+
+
 # -- sockets ----------------------------------------------------------------------------------------------------------
 
 

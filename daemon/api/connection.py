@@ -30,7 +30,6 @@ MAX_UNSENT_BYTES = 1024 * 1024
 """Unsent bytes at which a client is dropped."""
 STALLED_S = 10.0
 """Time of lost samples on end after which a client is dropped."""
-URGENT = ("stop", "estop")
 
 _numbers = itertools.count(1)
 
@@ -40,13 +39,17 @@ class Connection(asyncio.Protocol):
 
     Args:
         server: who it belongs to.
+
+    Attributes:
+        subscribed: whether it hears of events.
         crowded: there are too many clients; this one may only stop the robot.
     """
 
-    def __init__(self, server: Server, *, crowded: bool) -> None:
+    def __init__(self, server: Server) -> None:
         self.subscribed = False
+        self.crowded = False
         self._server = server
-        self._crowded = crowded
+        self._heard_s = asyncio.get_running_loop().time()
         self._transport: asyncio.Transport | None = None
         self._peer = Peer.nobody()
         self._name = f"client {next(_numbers)}"
@@ -78,13 +81,7 @@ class Connection(asyncio.Protocol):
         self._transport = transport
         self._peer = Peer.of(transport.get_extra_info("socket"))
         self._name = f"client {self._name.split()[-1]} (pid {self._peer.pid})"
-        if not self._server.admit(self):
-            self._answer(
-                None,
-                protocol.INVALID_REQUEST,
-                Refused("too many clients", remedy="close other clients, and connect again"),
-            )
-            self.end()
+        self._server.admit(self)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """It hung up, or was dropped: its motions stop."""
@@ -106,6 +103,20 @@ class Connection(asyncio.Protocol):
         if self._transport is not None:
             self._transport.abort()
 
+    def dismiss(self) -> None:
+        """Hang up for the sake of others, and say why."""
+        refusal = Refused("too many clients", remedy="close other clients, and connect again")
+        self._answer(None, protocol.INVALID_REQUEST, refusal)
+        self._server.counters.dropped_clients += 1
+        self.abort()
+
+    @property
+    def idle_s(self) -> float:
+        """How long nothing was heard of it; 0 while it subscribes or waits for an answer."""
+        if self.subscribed or self._pending:
+            return 0.0
+        return asyncio.get_running_loop().time() - self._heard_s
+
     def _drop(self, reason: str) -> None:
         if self._transport is not None:
             LOGGER.warning("%s dropped: %s", self._name, reason)
@@ -115,6 +126,7 @@ class Connection(asyncio.Protocol):
     def data_received(self, data: bytes) -> None:
         """Bytes came in; the lines in them are handled a few at a time."""
         self._received += data
+        self._heard_s = asyncio.get_running_loop().time()
         if not self._handling:
             self._handle_lines()
 
@@ -198,9 +210,9 @@ class Connection(asyncio.Protocol):
         if method is None:
             raise UsageError(f"no method {name[:80]!r}", remedy="api.schema lists the methods")
         self._peer.require(method)
-        if self._crowded and name not in URGENT:
+        if self.crowded and not method.urgent:
             raise Refused("too many clients: this one may only stop", remedy="close other clients, and connect again")
-        if len(self._pending) >= MAX_PENDING * (1 + (name in URGENT)):
+        if len(self._pending) >= MAX_PENDING * (1 + method.urgent):
             raise Refused("too many requests under way", limit=MAX_PENDING, remedy="wait for answers")
         return method
 
@@ -256,7 +268,7 @@ class Connection(asyncio.Protocol):
 
     async def _close_lease(self, params: dict[str, Any]) -> dict[str, Any]:
         if self._lease is not None:
-            self._server.backend.close_lease(self._lease)
+            self._server.backend.close_lease(self._lease, "its client ended it")
             self._lease = None
         if self._moving:
             await asyncio.wait(list(self._moving))

@@ -25,6 +25,8 @@ LOGGER = logging.getLogger("canhelm.api")
 MAX_CLIENTS = 32
 RESERVED_CLIENTS = 8
 """Further clients that may only stop: a crowd must not keep anybody from stopping the robot."""
+IDLE_S = 2.0
+"""Silence after which a client may lose its place to another one (longer than a lease lives without renewal)."""
 GROUP = "canhelm"
 
 
@@ -63,8 +65,8 @@ class Backend(Protocol):
         """Keep a lease alive. Raises Refused where it has run out."""
         ...
 
-    def close_lease(self, lease: str) -> None:
-        """The client is gone: its motions stop."""
+    def close_lease(self, lease: str, reason: str = "its client hung up") -> None:
+        """The client is gone, or lets go: its motions stop."""
         ...
 
     async def call(self, method: str, params: dict[str, Any], lease: str | None) -> dict[str, Any]:
@@ -110,6 +112,7 @@ class Server:
         self._listener: socket.socket | None = None
         self._server: asyncio.Server | None = None
         self._inode = 0
+        self._told_of_crowd = False
 
     async def start(self) -> None:
         """Open the socket.
@@ -149,21 +152,44 @@ class Server:
         return {**self.backend.status(), "api": {"pid": os.getpid(), **asdict(self.counters)}}
 
     def _accept(self) -> Connection:
-        return Connection(self, crowded=len(self.connections) >= MAX_CLIENTS)
+        return Connection(self)
 
-    def admit(self, connection: Connection) -> bool:
-        """Take a new connection in, unless there are too many even for stopping, or the server goes down."""
-        if self._server is None or len(self.connections) >= MAX_CLIENTS + RESERVED_CLIENTS:
-            self.counters.dropped_clients += 1
-            return False
+    def admit(self, connection: Connection) -> None:
+        """Take a new connection in, unless the server goes down.
+
+        Where all places are taken, the client that has been idle longest loses its own. While none is idle, a new one
+        may only stop the robot, and for that there is a place as long as not all of those are just being used to stop.
+        """
+        if self._server is None:
+            connection.abort()
+            return
+        ordinary = {each for each in self.connections if not each.crowded}
+        if len(ordinary) >= MAX_CLIENTS and not self._dismiss_idle(ordinary, max(IDLE_S, self.backend.lease_timeout_s)):
+            connection.crowded = True
+            others = self.connections - ordinary
+            if len(others) >= RESERVED_CLIENTS and not self._dismiss_idle(others, 0.0):
+                connection.dismiss()
+                return
         self.connections.add(connection)
         self.counters.clients = len(self.connections)
-        return True
 
     def leave(self, connection: Connection) -> None:
         """A connection has ended."""
         self.connections.discard(connection)
         self.counters.clients = len(self.connections)
+        self._told_of_crowd = self._told_of_crowd and self.counters.clients > MAX_CLIENTS // 2
+
+    def _dismiss_idle(self, connections: set[Connection], least_s: float) -> bool:
+        """Hang up on the one of them that has been idle longest; False where none has been idle for that long."""
+        if not self._told_of_crowd:
+            self._told_of_crowd = True
+            LOGGER.warning("too many clients (%d): the longest idle one is hung up on for each new one", MAX_CLIENTS)
+        longest = max(connections, key=lambda each: each.idle_s)
+        if longest.idle_s <= least_s:
+            return False
+        longest.dismiss()
+        self.leave(longest)
+        return True
 
     def _on_event(self, event: dict[str, Any]) -> None:
         line = protocol.make_notification("event", event)

@@ -16,7 +16,7 @@ import pytest
 
 from canhelm import aio, protocol
 from canhelm.client import Client
-from canhelm.errors import DaemonNotRunning, NodeAbsent, PermissionRefused, Timeout, UsageError
+from canhelm.errors import DaemonNotRunning, NodeAbsent, PermissionRefused, Refused, Timeout, UsageError
 from daemon.api.server import Server
 from vcan_tests.daemon.fake_backend import FakeBackend, served
 
@@ -37,6 +37,16 @@ def server(backend: FakeBackend, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(protocol, "RENEW_PERIOD_S", 0.1)
     with served(backend, tmp_path / "robot.sock") as server:
         yield server
+
+
+def dismiss_everybody(server: Server, backend: FakeBackend) -> None:
+    """As the server does with idle clients where there are too many."""
+
+    def dismiss() -> None:
+        for connection in list(server.connections):
+            connection.dismiss()
+
+    backend.loop.call_soon_threadsafe(dismiss)
 
 
 @pytest.fixture
@@ -209,3 +219,20 @@ async def test_the_asynchronous_client_has_the_same_shorthands(server: Server, b
     async with aio.Client(server.path) as client:
         assert (await client.status())["robot"] == "fake"
         assert await client.stop() == {"state": "idle"}
+
+
+def test_a_client_that_lost_its_place_is_told_why(server: Server, backend: FakeBackend) -> None:
+    with Client(server.path) as client:
+        client.status()
+        dismiss_everybody(server, backend)
+        with pytest.raises(Refused, match="too many clients"):
+            client.call("motor.velocity", node=1, velocity_rpm=1)
+
+
+@pytest.mark.real_time
+async def test_an_asynchronous_client_that_lost_its_place_is_told_why(server: Server, backend: FakeBackend) -> None:
+    async with aio.Client(server.path) as client:
+        await client.status()
+        dismiss_everybody(server, backend)
+        with pytest.raises(Refused, match="too many clients"):
+            await client.call("motor.velocity", node=1, velocity_rpm=1)

@@ -33,10 +33,12 @@ class FakeBackend:
         self.events: list[Callable[[dict[str, Any]], None]] = []
         self.calls: list[tuple[str, dict[str, Any], str | None]] = []
         self.stopped: list[str] = []
+        self.stop_reasons: list[str] = []
         self.called = threading.Event()
         self.ran_out = threading.Event()
         self.renewals = 0
         self.padding = ""
+        self.loop: asyncio.AbstractEventLoop
         self._leases: dict[str, asyncio.TimerHandle] = {}
         self._motions: dict[str, list[asyncio.Future[None]]] = {}
 
@@ -76,11 +78,12 @@ class FakeBackend:
         self._leases.pop(lease).cancel()
         self._leases[lease] = self._expiry(lease)
 
-    def close_lease(self, lease: str) -> None:
+    def close_lease(self, lease: str, reason: str = "its client hung up") -> None:
         self._leases.pop(lease).cancel()
         for motion in self._motions[lease]:
             if not motion.done():
                 self.stopped.append(lease)
+                self.stop_reasons.append(reason)
                 motion.set_result(None)
 
     async def call(self, method: str, params: dict[str, Any], lease: str | None) -> dict[str, Any]:
@@ -107,7 +110,7 @@ class FakeBackend:
 @contextmanager
 def served(backend: FakeBackend, path: Path) -> Iterator[Server]:
     """A server for the backend on a real loop in a thread of its own."""
-    loop = asyncio.new_event_loop()
+    loop = backend.loop = asyncio.new_event_loop()
     thread = threading.Thread(target=loop.run_forever)
     thread.start()
     server = Server(backend, path)

@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 from canhelm import protocol
 from canhelm.errors import ConfigError, Refused
 from daemon.api import connection as connection_module
+from daemon.api import server as server_module
 from daemon.api.connection import MAX_MALFORMED, MAX_PENDING
 from daemon.api.server import MAX_CLIENTS, RESERVED_CLIENTS, Server
 from vcan_tests.daemon.fake_backend import FakeBackend
@@ -267,12 +268,44 @@ async def test_a_crowd_of_clients_leaves_room_to_stop(server: Server, connect: C
     assert "result" in await late.ask("stop")
 
 
-async def test_a_crowd_without_end_is_turned_away(server: Server, connect: Connect) -> None:
-    for _ in range(MAX_CLIENTS + RESERVED_CLIENTS):
+async def test_however_many_clients_there_are_one_more_can_stop_the_robot(server: Server, connect: Connect) -> None:
+    for _ in range(MAX_CLIENTS + 2 * RESERVED_CLIENTS):
         await connect(server)
     late = await connect(server)
-    assert "too many clients" in (await late.answer())["error"]["message"]
-    assert await late.ended()
+    assert "result" in await late.ask("estop")
+    assert len(server.connections) == MAX_CLIENTS + RESERVED_CLIENTS
+
+
+async def test_the_longest_idle_client_makes_room_for_a_new_one_and_is_told_so(
+    server: Server, backend: FakeBackend, connect: Connect, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    subscriber, idle = await connect(server), await connect(server)
+    await subscriber.ask("subscribe", rate_hz=0.1)
+    await idle.ask("hello")
+    for _ in range(MAX_CLIENTS - 2):
+        await (await connect(server)).ask("hello")
+    monkeypatch.setattr(server_module, "IDLE_S", 0.0)
+    backend.lease_timeout_s = 0.0
+    assert "result" in await (await connect(server)).ask("status")
+    assert "too many clients" in (await idle.answer())["error"]["message"]
+    assert await idle.ended()
+    assert "result" in await subscriber.ask("hello")
+
+
+async def test_a_crowd_is_logged_once(server: Server, connect: Connect, caplog: pytest.LogCaptureFixture) -> None:
+    for _ in range(MAX_CLIENTS + 2 * RESERVED_CLIENTS):
+        await connect(server)
+    assert [record.message for record in caplog.records if "too many" in record.message] == [
+        f"too many clients ({MAX_CLIENTS}): the longest idle one is hung up on for each new one"
+    ]
+
+
+async def test_a_client_that_lets_go_of_its_motion_has_not_hung_up(backend: FakeBackend, client: RawClient) -> None:
+    client.send(protocol.make_request(1, "motor.velocity", {"node": 1, "velocity_rpm": 5}))
+    await client.ask("hello")
+    client.send(protocol.make_request(2, "lease.close", {}))
+    await client.answer()
+    assert backend.stop_reasons == ["its client ended it"]
 
 
 # -- subscriptions ----------------------------------------------------------------------------------------------------
