@@ -18,6 +18,7 @@ from daemon.runtime.supervisor import Supervisor
 from daemon.runtime.vehicles import make_vehicle
 from daemon.wires import make_wire
 from drivers.canopen.master import Master
+from drivers.contract import Drive
 from drivers.devices import Devices
 from profiles.schema import Profile
 
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from daemon.api.server import Server
 
 LOGGER = logging.getLogger("canhelm")
+ENDINGS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+"""Signals that end the daemon in order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +73,7 @@ class App:
         powered: bool = True,
         gateway: GatewayAccess | None = None,
     ) -> None:
+        self.spec = bus
         self.wire = wire = make_wire(bus, profile, seed)
         self.profile = profile = wire.profile
         self.network = wire.network
@@ -122,11 +126,11 @@ class App:
         self.devices.start()
         self.cycle.start()
 
-    async def close(self) -> None:
-        """Bring the vehicle to rest, then take everything down."""
+    async def close(self) -> tuple[Drive, ...]:
+        """Bring the vehicle to rest, then take everything down; the drives that are not known to be at rest and off."""
         if self.gateway is not None:
             await self.gateway.close()
-        await self.supervisor.close()
+        doubtful = await self.supervisor.close()
         self.cycle.stop()
         await self.devices.close()
         await self.master.close()
@@ -136,16 +140,31 @@ class App:
             await self.server.close()
         if self.recorder is not None:
             self.recorder.close()
+        return doubtful
 
-    async def run(self) -> None:
-        """Run until SIGTERM or SIGINT, then go down in order; a second signal does not cut that short."""
+    async def run(self) -> str:
+        """Run until a signal ends it, then go down in order; a second signal does not cut that short.
+
+        Returns:
+            One sentence on how the vehicle was left.
+        """
         loop = asyncio.get_running_loop()
         ended = asyncio.Event()
-        for number in (signal.SIGTERM, signal.SIGINT):
-            loop.add_signal_handler(number, ended.set)
+        for number in ENDINGS:
+            if signal.getsignal(number) is not signal.SIG_IGN:  # nohup ignores the hang-up of a terminal
+                loop.add_signal_handler(number, ended.set)
         try:
             await self.start()
+            LOGGER.info("robot %s on %s, socket %s", self.profile.name, self.spec, self.server and self.server.path)
             await ended.wait()
             LOGGER.info("going down: stopping the vehicle")
         finally:
-            await self.close()
+            doubtful = await self.close()
+        return _farewell(doubtful)
+
+
+def _farewell(doubtful: tuple[Drive, ...]) -> str:
+    if not doubtful:
+        return "the vehicle is at rest and its drives are off"
+    names = ", ".join(f"node {drive.node} ({drive.name})" for drive in doubtful)
+    return f"ended without contact to {names}: make sure yourself that the vehicle is at rest and its drives are off"

@@ -62,7 +62,8 @@ class Devices:
     async def close(self) -> None:
         """Engage the brakes, end life guarding where drives are off, and end the boot-ups."""
         for brake in self.brakes.values():
-            await _as_far_as_possible(brake.engage)
+            if self.drives[brake.drive].node_state is NodeState.READY:
+                await _as_far_as_possible(brake.engage)
         for device in self.by_node.values():
             if device.node_state is NodeState.READY:
                 await _as_far_as_possible(device.before_close)

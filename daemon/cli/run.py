@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import signal
+import sys
 from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,7 +13,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from canhelm import protocol
-from canhelm.errors import UsageError
+from canhelm.errors import ConfigError, UsageError
 from daemon.cli.output import say
 
 
@@ -23,7 +25,7 @@ def run(
     virtual_time: Annotated[bool, Parameter(negative=())] = False,
     seed: int = 0,
     socket: Path | None = None,
-    record: Path | None = None,
+    record: str | None = None,
     unpowered: Annotated[bool, Parameter(negative=())] = False,
     gateway: Path | None = None,
     gateway_tcp: int | None = None,
@@ -47,11 +49,20 @@ def run(
         gateway_tcp: Port on the loopback interface for such tools as well, to read only.
         gateway_write: Let them write objects and command network states through the gateway's socket, too.
     """
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _end_before_it_began)
     from daemon.app import App, GatewayAccess
     from daemon.runtime.clock import run_precise
     from profiles.loader import load
 
     chosen = _bus(bus, simulate=simulate)
+    if unpowered and not simulates(chosen):
+        raise UsageError(
+            f"--unpowered is for simulated drives, and {chosen} is real", remedy="leave it out; switch its power off"
+        )
+    if record == "":
+        raise UsageError("--record is empty", remedy="name a folder or a file, as --record logs")
     if profile is None:
         raise UsageError(
             "which robot?", remedy="give --profile NAME or FILE; `canhelm profile list` shows the shipped ones"
@@ -62,36 +73,50 @@ def run(
             remedy="leave --virtual-time out, or use `canhelm demo --virtual-time`",
         )
     loaded = load(profile)
+    for given in (socket, gateway):
+        _require_folder(given)
     path = socket or Path(protocol.default_socket(loaded.profile.name))
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s %(message)s")
-    logging.getLogger("canhelm").info("robot %s on %s, socket %s", loaded.profile.name, chosen, path)
     access = GatewayAccess(gateway or path.with_suffix(protocol.GATEWAY_SUFFIX), gateway_tcp, gateway_write)
 
-    async def serve() -> None:
+    async def serve() -> str:
         app = App(
             loaded.profile,
             chosen,
             socket=path,
-            record=record,
+            record=Path(record) if record else None,
             seed=seed,
             powered=not unpowered,
             gateway=access,
         )
-        await app.run()
+        return await app.run()
 
-    runner: Callable[[Coroutine[Any, Any, None]], None] = run_precise if _simulated(chosen) else asyncio.run
-    runner(serve())
-    say("the vehicle is at rest and its drives are off")
+    runner: Callable[[Coroutine[Any, Any, str]], str] = run_precise if simulates(chosen) else asyncio.run
+    say(runner(serve()))
     return 0
 
 
+def _end_before_it_began(number: int, _: object) -> None:
+    say("ended before it began")
+    sys.exit(0)
+
+
+def _require_folder(socket: Path | None) -> None:
+    """Raise ConfigError where the folder of a socket is missing: a path that a person gives is not made up for."""
+    if socket is not None and not socket.parent.is_dir():
+        raise ConfigError(
+            f"there is no folder {socket.parent} for {socket.name}", remedy="make it, or correct the path"
+        )
+
+
 def _bus(bus: str | None, *, simulate: bool) -> str:
-    if simulate and bus is not None and not _simulated(bus):
+    if simulate and bus is not None and not simulates(bus):
         raise UsageError(f"--simulate and --bus {bus} contradict each other", remedy="give one of them")
     if bus is None and not simulate:
         raise UsageError("which bus?", remedy="give --simulate, or --bus socketcan:can0")
     return bus or "simulated"
 
 
-def _simulated(bus: str) -> bool:
+def simulates(bus: str) -> bool:
+    """Whether a bus SPEC means a simulated network."""
     return bus.partition("@")[0] in ("simulated", "rs232")

@@ -36,6 +36,11 @@ class EventLog:
         for listener in self.listeners:
             listener(event)
 
+    def told(self, message: str) -> bool:
+        """Whether an event of the last second has said this already."""
+        since_s = asyncio.get_running_loop().time() - 1.0
+        return any(event["message"] == message and event["time_s"] >= since_s for event in self.events)
+
     def last(self, count: int) -> list[dict[str, Any]]:
         """The newest ``count`` events, oldest first."""
         return list(self.events)[-count:]

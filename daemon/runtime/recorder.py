@@ -27,8 +27,8 @@ class CandumpRecorder:
 
     Args:
         bus: the interface to listen to.
-        path: the log (``*.log``), which must not exist yet, or a folder, made where it is missing, which gets a new
-            ``candump-<robot>-<n>.log``.
+        path: the log (``*.log``), which must not exist yet, or a folder, which gets a new
+            ``candump-<robot>-<n>.log``; it is made where only it is missing, not the one around it.
         robot: the robot's name.
         virtual: whether the loop runs on virtual time. Then times count from zero, so that two runs with one seed
             write the same bytes; otherwise they are those of the wall clock.
@@ -85,7 +85,7 @@ class CandumpRecorder:
         if self.path.suffix == ".log":
             return FileIO(self.path, "x")
         folder, number = self.path, 0
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(exist_ok=True)
         while True:
             number += 1
             self.path = folder / f"candump-{self._robot}-{number}.log"

@@ -129,7 +129,9 @@ class Stopping:
         if not self.latched:
             self.cause = error
         self._halt(error)
-        self._log.add("error", f"node {error.node}" if error.node else "supervisor", error.message, error.remedy or "")
+        if not self._log.told(error.message):
+            source = f"node {error.node}" if error.node else "supervisor"
+            self._log.add("error", source, error.message, error.remedy or "")
         self._tasks.spawn(self._stop_and_disable(), STOP)
 
     async def close(self) -> None:
@@ -190,6 +192,11 @@ class Stopping:
     def anything_enabled(self) -> bool:
         """True while any drive has its power stage on."""
         return any(drive.state not in POWERLESS for drive in self._drives)
+
+    @property
+    def doubtful(self) -> tuple[Drive, ...]:
+        """Drives that are not known to be at rest with their power stage off."""
+        return tuple(drive for drive in self._drives if drive.state not in OFF or abs(drive.speed_m_s) > AT_REST_M_S)
 
     async def power_off(self, drive: Drive) -> None:
         """Engage what holds the axis, then switch the drive off. Raises NotReady or Timeout."""

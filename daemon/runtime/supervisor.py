@@ -227,9 +227,9 @@ class Supervisor:
         """Keep a lease alive. Raises Refused where it has run out."""
         self.leases.renew(lease)
 
-    def close_lease(self, lease: str) -> None:
-        """The client is gone: its motions stop."""
-        self.release_motions(lease, "its client hung up")
+    def close_lease(self, lease: str, reason: str = "its client hung up") -> None:
+        """The client is gone, or lets go: its motions stop."""
+        self.release_motions(lease, reason)
         self.leases.close(lease)
 
     @property
@@ -257,10 +257,15 @@ class Supervisor:
     def _on_task_failure(self, name: str, error: BaseException) -> None:
         self.fault(DeviceFault(f"the daemon's {name} task failed: {error}", remedy="report it with the log"))
 
-    async def close(self) -> None:
-        """Bring the vehicle to rest, switch every power stage off, and end all tasks."""
+    async def close(self) -> tuple[Drive, ...]:
+        """Bring the vehicle to rest, switch every power stage off, and end all tasks.
+
+        Returns:
+            The drives that are not known to be at rest and off.
+        """
         await self._stopping.close()
         await self._tasks.close()
+        return self._stopping.doubtful
 
 
 def _sum(one: Command, other: Command) -> Command:

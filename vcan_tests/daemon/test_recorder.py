@@ -75,7 +75,7 @@ async def test_nothing_is_recorded_after_the_end(port: SimulatedPort, tmp_path: 
 
 
 async def test_a_folder_gets_a_fresh_file_each_time(port: SimulatedPort, tmp_path: Path) -> None:
-    folder = tmp_path / "deep" / "logs"
+    folder = tmp_path / "logs"
     for _ in range(2):
         recorder = CandumpRecorder(port, folder, "max2d", virtual=True)
         recorder.start()

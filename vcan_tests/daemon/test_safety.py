@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections import Counter
 from typing import Any
 
 import pytest
@@ -49,6 +50,37 @@ async def test_a_drive_lost_while_its_brake_is_released_is_one_fault_and_not_end
         assert "front_left" in error.message
         assert robot.fastest_wheel_m_s < 0.01
         assert len(robot.app.supervisor.log.events) < 30
+
+
+@pytest.mark.parametrize("command", ["stop", "estop"])
+@pytest.mark.parametrize("without_power", ["all", "rear_right", "front_left"])
+async def test_a_stop_is_told_once_whichever_nodes_have_no_power(command: str, without_power: str) -> None:
+    async with running_robot(expect_errors=True) as robot:
+        robot.network.power_off(without_power)
+        await asyncio.sleep(1.0)
+        await robot.call(command)
+        await asyncio.sleep(5.0)
+        told = Counter(event["message"] for event in robot.app.supervisor.log.events)
+        assert max(told.values()) == 1, told
+
+
+@pytest.mark.parametrize("command", ["stop", "estop"])
+async def test_a_stop_before_any_node_has_power_is_quiet(command: str) -> None:
+    async with running_robot(expect_errors=True, powered=False, booted=False) as robot:
+        await asyncio.sleep(1.0)
+        before = len(robot.app.supervisor.log.events)
+        await robot.call(command)
+        await asyncio.sleep(5.0)
+        assert len(robot.app.supervisor.log.events) - before <= 1
+
+
+async def test_a_fault_of_a_drive_is_told_once() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        _twin(robot, 2).trigger_fault(0x4210)
+        await robot.until(lambda: robot.state == "fault")
+        await asyncio.sleep(1.0)
+        told = [event for event in robot.app.supervisor.log.events if "temperature" in event["message"]]
+        assert len(told) == 1
 
 
 async def test_a_brake_whose_switching_was_cancelled_can_be_switched_again() -> None:

@@ -1,0 +1,104 @@
+"""``canhelm run``: how a daemon begins, what it refuses, and how it ends."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from canhelm.errors import ConfigError
+from daemon.app import App
+from daemon.cli.main import main
+from profiles.loader import load
+from vcan_tests.robot import Robot
+
+SIMULATED = ("run", "--simulate", "--profile", "max2d")
+
+
+@pytest.mark.real_time
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+async def test_a_signal_ends_the_daemon_in_order(number: signal.Signals, tmp_path: Path) -> None:
+    app = App(load("max2d").profile, socket=tmp_path / "robot.sock", powered=False)
+    running = asyncio.create_task(app.run())
+    await Robot(app).until(lambda: app.cycle.counters.cycles > 0)
+    os.kill(os.getpid(), number)
+    await asyncio.wait_for(running, 5.0)
+    assert not (tmp_path / "robot.sock").exists()
+
+
+@pytest.mark.real_time
+async def test_a_hang_up_that_is_ignored_stays_ignored(tmp_path: Path) -> None:
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    app = App(load("max2d").profile, socket=tmp_path / "robot.sock", powered=False)
+    running = asyncio.create_task(app.run())
+    await Robot(app).until(lambda: app.cycle.counters.cycles > 0)
+    os.kill(os.getpid(), signal.SIGHUP)
+    await asyncio.sleep(0.05)
+    assert not running.done()
+    os.kill(os.getpid(), signal.SIGTERM)
+    await running
+
+
+@pytest.fixture(autouse=True)
+def _signals() -> Iterator[None]:
+    """Those that a command has taken are given back."""
+    numbers = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+    before = [signal.getsignal(number) for number in numbers]
+    yield
+    for number, handler in zip(numbers, before, strict=True):
+        signal.signal(number, handler)
+
+
+def test_a_signal_before_the_daemon_has_begun_is_an_orderly_end() -> None:
+    script = "import signal, daemon.cli.run as run\nrun._bus = lambda *_, **__: signal.raise_signal(signal.SIGTERM)\n"
+    command = [sys.executable, "-c", script + "run.run(profile='max2d', simulate=True)"]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=20)
+    assert (ended.returncode, ended.stderr) == (0, "canhelm: ended before it began\n")
+
+
+async def test_the_end_says_of_which_drives_nothing_is_known() -> None:
+    app = App(load("max2d").profile)
+    await app.start()
+    assert app.network is not None
+    await Robot(app).until(lambda: app.service.state == "idle")
+    app.network.power_off("rear_left")
+    await asyncio.sleep(1.0)
+    assert [drive.name for drive in await app.close()] == ["rear_left"]
+
+
+async def test_the_end_of_a_healthy_robot_leaves_no_doubt() -> None:
+    app = App(load("max2d").profile)
+    await app.start()
+    await asyncio.sleep(3.0)
+    assert await app.close() == ()
+
+
+async def test_a_daemon_that_cannot_record_says_only_that(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    app = App(load("max2d").profile, record=tmp_path / "none" / "logs")
+    with pytest.raises(ConfigError, match="none/logs"):
+        await app.start()
+    await app.close()
+    assert caplog.messages == []
+
+
+@pytest.mark.parametrize("option", ["--socket", "--gateway"])
+def test_the_folder_of_a_socket_is_not_made_up(option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*SIMULATED, option, str(tmp_path / "none" / "x.sock")]) == 7
+    assert f"there is no folder {tmp_path / 'none'}" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_empty_record_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*SIMULATED, "--record", ""]) == 2
+    assert "--record is empty" in capsys.readouterr().err
+
+
+def test_real_drives_cannot_be_asked_to_have_no_power(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "--bus", "socketcan:can0", "--profile", "max2d", "--unpowered"]) == 2
+    assert "socketcan:can0 is real" in capsys.readouterr().err
