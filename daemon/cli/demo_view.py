@@ -63,6 +63,10 @@ class DemoView:
         phase = next((str(motion.progress().get("phase", "")) for motion in supervisor.motions.values()), "")
         x, y, yaw = world.pose if world else (0.0, 0.0, 0.0)
         caption = f"x {x:+.2f} m  y {y:+.2f} m  yaw {math.degrees(yaw):+.1f}°  bus {app.bus.load():.0%}"
+        line = app.bus.details()
+        if line:
+            busy, ours = line["line_utilisation"], line["own_idle_share"]
+            caption += f"\nserial line: {app.cycle.counters.achieved_hz:.1f} cycles/s, busy {busy:.0%}, idle on our side {ours:.1%}"
         table = Table(title=f"{supervisor.state.value} {phase}", caption=caption, min_width=70)
         for column in ("wheel", "heading", "commanded", "measured", "current"):
             table.add_column(column, justify="left" if column == "wheel" else "right")

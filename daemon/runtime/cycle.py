@@ -35,12 +35,14 @@ class CycleCounters:
         late_cycles: steps that ended after their period, and ticks that came a period late or more.
         incomplete: steps that ran without some node's reading.
         max_lateness_s: worst delay of a tick behind its time.
+        achieved_hz: cycles a second, over the last second or so.
     """
 
     cycles: int = 0
     late_cycles: int = 0
     incomplete: int = 0
     max_lateness_s: float = 0.0
+    achieved_hz: float = 0.0
 
 
 class Cycle:
@@ -79,6 +81,7 @@ class Cycle:
         self._waiting = False
         self._tick_s = 0.0
         self._last_step_s: float | None = None
+        self._mark = (0.0, 0)
         self._deadline: asyncio.TimerHandle | None = None
         devices.on_reading = self._on_reading
 
@@ -128,6 +131,9 @@ class Cycle:
         self._step(now, dt)
         counters = self.counters
         counters.cycles += 1
+        if now >= self._mark[0] + 1.0:
+            counters.achieved_hz = (counters.cycles - self._mark[1]) / (now - self._mark[0])
+            self._mark = (now, counters.cycles)
         end = self._loop.time()
         lateness = self._ticker.max_lateness_s
         counters.max_lateness_s = max(counters.max_lateness_s, lateness)

@@ -24,7 +24,6 @@ from canhelm.errors import BusOff, CanhelmError
 from drivers.bus.contract import ID_MASK, RTR_FLAG, Bus
 from drivers.canopen.codes import NmtCommand, NmtState
 from drivers.canopen.objects import ObjectTable
-from drivers.epos.codec import TPDO1
 from drivers.epos.objects import OBJECTS as EPOS
 from drivers.epos.serial_answers import Answer
 from drivers.epos.serial_conversation import Transport
@@ -36,11 +35,9 @@ from drivers.epos.serial_frames import (
     make_write_object,
 )
 from drivers.epos.serial_line import SerialLine
+from drivers.epos.serial_reading import OnData, Readings
 from drivers.epos.serial_sdo import SILENT, SdoBridge
 
-FAULT_BIT = 0x0008
-CURRENT_EVERY = 8
-"""Rounds between two readings of the gateway's own current."""
 RECONNECT_S = 1.0
 MEMORY_S = 1.0
 """A node that has answered within this time counts as alive while it cannot be asked."""
@@ -51,7 +48,6 @@ _STATES = {
     NmtCommand.RESET_NODE: NmtState.BOOT_UP,
     NmtCommand.RESET_COMMUNICATION: NmtState.BOOT_UP,
 }
-OnData = Callable[[bytes], None]
 
 
 class SerialGatewayBus(Bus):
@@ -94,12 +90,7 @@ class SerialGatewayBus(Bus):
         self._encoders = encoders
         self._facts = facts
         self._bridges: dict[int, SdoBridge] = {}
-        self._states: dict[int, NmtState] = {}
-        self._asked: set[int] = set()
-        self._faulty: set[int] = set()
-        self._rounds = 0
-        self._statusword = b"\0\0"
-        self._current = b"\0\0"
+        self._readings = Readings(gateway, encoders, self._submit, self._receive)
         self._toggles: dict[int, int] = {}
         self._spoke_s: dict[int, float] = {}
         self._probed: set[int] = set()
@@ -175,7 +166,7 @@ class SerialGatewayBus(Bus):
         elif can_id == 0x000:
             self._command(NmtCommand(data[0]), data[1])
         elif can_id == 0x080:
-            self._read_round()
+            self._readings.begin_round(self.silent)
         elif node == self.gateway:
             self.write(EPOS["controlword"].index, 0, data[:2], deadline_s, urgent=True)
         else:
@@ -201,9 +192,7 @@ class SerialGatewayBus(Bus):
         )
 
     def _command(self, command: NmtCommand, node: int) -> None:
-        for each in [node] if node else list(self._states):
-            self._states[each] = _STATES[command]
-            self._faulty.discard(each)
+        self._readings.command(node, _STATES[command])
         self._submit(make_send_nmt(node, command), node, math.inf)
 
     def _bridge(self, node: int) -> SdoBridge:
@@ -219,7 +208,7 @@ class SerialGatewayBus(Bus):
             bridge = self._bridges[node] = SdoBridge(node, self.line, table, answer, self._on_silence)
         return bridge
 
-    # --- what it reads -------------------------------------------------------------------------------------------
+    # --- guarding ------------------------------------------------------------------------------------------------
 
     def _ask_state(self, node: int, deadline_s: float) -> None:
         """Guard a node.
@@ -236,75 +225,12 @@ class SerialGatewayBus(Bus):
     def _answer_from_memory(self, node: int) -> None:
         loop = asyncio.get_running_loop()
         if loop.time() - self._spoke_s.get(node, -math.inf) < MEMORY_S:
-            loop.call_soon(self._state_of, node, self._states.get(node, NmtState.PRE_OPERATIONAL))
+            loop.call_soon(self._state_of, node, self._readings.states.get(node, NmtState.PRE_OPERATIONAL))
 
     def _state_of(self, node: int, state: int) -> None:
         """Hand a node's state up; the toggle bit is of this bus, because not every answer came from the node."""
         toggle = self._toggles[node] = self._toggles.get(node, 0) ^ 0x80
         self._receive(0x700 + node, bytes((toggle | state,)))
-
-    def _read_round(self) -> None:
-        """Ask every node that runs and is not being asked already; a reading that comes late is still a reading."""
-        self._rounds += 1
-        for node, state in self._states.items():
-            if state is not NmtState.OPERATIONAL or node in self.silent or node in self._asked:
-                continue
-            if node == self.gateway:
-                self._read_gateway()
-            elif node in self._encoders:
-                position = self._encoders[node]["position_value"]
-                self._ask(node, make_read_object(node, position.index, 0), 0x280 + node)
-            else:
-                self._ask(node, make_request_can_frame(0x180 + node, TPDO1.size), 0x180 + node)
-
-    def _ask(self, node: int, request: bytes, can_id: int) -> None:
-        def take(data: bytes) -> None:
-            if can_id & 0x780 == 0x180:
-                self._hand_up_drive(node, data)
-            else:
-                self._receive(can_id, data)
-
-        self._asked.add(node)
-        self._submit(request, node, math.inf, take, then=lambda: self._asked.discard(node))
-
-    def _read_gateway(self) -> None:
-        def status(data: bytes) -> None:
-            self._statusword = data[:2]
-
-        def current(data: bytes) -> None:
-            self._current = data[:2]
-
-        def position(data: bytes) -> None:
-            self._hand_up_drive(self.gateway, self._statusword + data + self._current)
-
-        self._asked.add(self.gateway)
-        self._read_own("statusword", status)
-        if self._rounds % CURRENT_EVERY == 0:
-            self._read_own("current_actual_value", current)
-        self._read_own("position_actual_value", position, lambda: self._asked.discard(self.gateway))
-
-    def _read_own(self, name: str, take: OnData, then: Callable[[], None] | None = None) -> None:
-        self._submit(make_read_object(self.gateway, EPOS[name].index, 0), self.gateway, math.inf, take, then=then)
-
-    def _hand_up_drive(self, node: int, tpdo1: bytes) -> None:
-        """Hand a drive's reading up; when it has just gone into fault, after the error that it recorded.
-
-        Emergency messages are not forwarded, so the error is read and goes up as the message it would have been.
-        """
-        if not tpdo1[0] & FAULT_BIT:
-            self._faulty.discard(node)
-        if not tpdo1[0] & FAULT_BIT or node in self._faulty:
-            self._receive(0x180 + node, tpdo1)
-            return
-        self._faulty.add(node)
-        entry = EPOS["error_history_entry_1"]
-        self._submit(
-            make_read_object(node, entry.index, entry.sub),
-            node,
-            math.inf,
-            lambda data: self._receive(0x080 + node, data[:2] + b"\0" * 6),
-            then=lambda: self._receive(0x180 + node, tpdo1),
-        )
 
     # --- the line ------------------------------------------------------------------------------------------------
 

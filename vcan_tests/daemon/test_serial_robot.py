@@ -101,6 +101,16 @@ async def test_a_fault_of_the_drive_on_the_line_is_told_by_its_code() -> None:
             await driving
 
 
+async def test_an_alarm_of_an_encoder_is_found_by_its_error_register() -> None:
+    async with running_robot(bus="rs232", expect_errors=True) as robot:
+        driving = await _at_speed(robot, 0.3)
+        robot.network.encoders["front"].set_alarms(1)
+        with pytest.raises(CanhelmError, match="front"):
+            await driving
+        robot.network.encoders["front"].set_alarms(0)
+        await robot.until(lambda: robot.app.devices.by_node[6].fault is None, 5.0)
+
+
 def test_slower_sensing_means_a_lower_speed_with_the_same_way_to_rest() -> None:
     speed = serial_speed_m_s(1.2, 2.0, 0.01, 0.06)
     way = 1.2 * 0.02 + 1.2**2 / 4.0
