@@ -120,6 +120,7 @@ class App:
             virtual = isinstance(asyncio.get_running_loop(), VirtualTimeLoop)
             self.recorder = CandumpRecorder(self.bus, self._record, self.profile.name, virtual=virtual)
             self.recorder.start()
+            self.service.recorder = self.recorder
         if self.network is not None and self._powered:
             self.network.power_on("all")
         await self.master.start()

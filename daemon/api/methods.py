@@ -123,7 +123,11 @@ _TALK = (
     Method("hello", "Who answers.", (), "api_version, version, robot, state, lease_timeout_s", Role.WATCH),
     Method("api.schema", "Every method, event and error.", (), "methods, notifications, errors", Role.WATCH),
     Method(
-        "status", "State at a glance.", (), "state, message, nodes, brakes, vehicle, bus, cycle, events", Role.WATCH
+        "status",
+        "State at a glance.",
+        (),
+        "state, message, nodes, brakes, vehicle, bus, cycle, recording, events",
+        Role.WATCH,
     ),
     Method(
         "subscribe",
@@ -140,7 +144,14 @@ _TALK = (
 )
 
 _WHOLE = (
-    Method("stop", "Stop everything now; answers at rest. Needs no lease.", (), "state", Role.WATCH, urgent=True),
+    Method(
+        "stop",
+        "Stop everything now; answers at rest. Needs no lease.",
+        (),
+        "state, enabled, message",
+        Role.WATCH,
+        urgent=True,
+    ),
     Method(
         "estop",
         "Emergency stop: quick stop, disable, latched until reset. Needs no lease.",

@@ -184,6 +184,7 @@ def status_findings(status: Mapping[str, Any]) -> Iterator[Finding]:
     api = status.get("api") or {}
     yield _cycle_finding(status.get("cycle") or {}, api.get("pid"))
     yield _bus_finding(status.get("bus") or {})
+    yield from _recording_findings(status.get("recording") or {})
     defects = api.get("internal_errors", 0)
     if defects:
         yield Finding(
@@ -204,11 +205,26 @@ def _node_finding(node: Mapping[str, Any]) -> Finding:
     return Finding(name, "ok", f"{node.get('node_state')}, {node.get('state', 'reading')}")
 
 
+def _recording_findings(recording: Mapping[str, Any]) -> Iterator[Finding]:
+    path, lost = recording.get("path"), recording.get("lost", 0)
+    if recording.get("failing"):
+        found = f"the log {path} cannot be written, {lost} frames are lost"
+        yield Finding("recording", "problem", found, "make room on its disk: recording goes on by itself")
+    elif lost:
+        yield Finding("recording", "note", f"{lost} frames are missing in the log {path}", "its disk was full")
+    elif recording:
+        yield Finding("recording", "ok", f"{recording.get('frames')} frames in {path}")
+
+
 def _cycle_finding(cycle: Mapping[str, Any], pid: int | None) -> Finding:
     cycles, late = cycle.get("cycles", 0), cycle.get("late_cycles", 0)
-    found = f"{late} of {cycles} control cycles were late"
+    worst_ms, period_ms = cycle.get("max_lateness_ms", 0.0), 1e3 / cycle.get("hz", 100.0)
+    found = f"{late} of {cycles} control cycles were late, the worst one began {worst_ms:.1f} ms late"
+    mend = f"give it a real-time priority: sudo chrt -f -p 50 {pid}"
     if late > LATE_SHARE * cycles:
-        return Finding("cycle", "problem", found, f"give it a real-time priority: sudo chrt -f -p 50 {pid}")
+        return Finding("cycle", "problem", found, mend)
+    if worst_ms > period_ms:
+        return Finding("cycle", "note", found, mend)
     return Finding("cycle", "ok", found)
 
 

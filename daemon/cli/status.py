@@ -63,7 +63,9 @@ def table(data: Mapping[str, Any]) -> RenderableType:
     from rich.console import Group
 
     parts: list[RenderableType] = [_headline(data), _nodes(data.get("nodes") or ()), _brakes(data.get("brakes") or ())]
-    parts += [_section(title, data[title]) for title in ("vehicle", "motions", "cycle", "bus") if data.get(title)]
+    parts += [
+        _section(title, data[title]) for title in ("vehicle", "motions", "cycle", "bus", "recording") if data.get(title)
+    ]
     parts += [_event(event) for event in list(data.get("events") or ())[-SHOWN_EVENTS:]]
     return Group(*parts)
 

@@ -92,7 +92,7 @@ def check_target(geometry: PairedSteerGeometry, limits: Limits, target: PairedSt
             _check_heading(geometry, limits, name, heading)
     if abs(target.speed_m_s) > limits.speed_m_s * (1 + _ROUNDING):
         raise LimitExceeded(
-            f"a speed of {target.speed_m_s:g} m/s is beyond the vehicle's limit of {limits.speed_m_s:g} m/s",
+            f"a speed of {target.speed_m_s:g} m/s is beyond the vehicle's limit",
             value=target.speed_m_s,
             limit=f"speed_m_s {limits.speed_m_s:g}",
             remedy=f"ask for at most {limits.speed_m_s:g} m/s",
@@ -120,8 +120,8 @@ def _check_heading(geometry: PairedSteerGeometry, limits: Limits, name: str, hea
     heading_deg = math.degrees(heading_rad)
     if abs(heading_deg) > limits.heading_deg + _ROUNDING:
         raise LimitExceeded(
-            f"a heading of {heading_deg:g} deg for the {name} pair is beyond the limit of {limits.heading_deg:g} deg "
-            f"to each side (the stops stand at {geometry.max_heading_deg:g} deg)",
+            f"a heading of {heading_deg:g} deg for the {name} pair is beyond the limit to each side; the stops stand "
+            f"at {geometry.max_heading_deg:g} deg",
             value=round(heading_deg, 6),
             limit=f"heading_deg {limits.heading_deg:g}",
             remedy=f"ask for a heading from {-limits.heading_deg:g} to {limits.heading_deg:g} deg",
@@ -133,7 +133,7 @@ def _check_wheels(limits: Limits, speed_m_s: float, solution: TurningSolution) -
     if fastest > limits.wheel_speed_m_s * (1 + _ROUNDING):
         possible = abs(speed_m_s) * limits.wheel_speed_m_s / fastest
         raise LimitExceeded(
-            f"the fastest wheel would roll at {fastest:.3f} m/s, beyond its limit of {limits.wheel_speed_m_s:g} m/s",
+            f"the fastest wheel would roll at {fastest:.3f} m/s, beyond its limit",
             value=round(fastest, 6),
             limit=f"wheel_speed_m_s {limits.wheel_speed_m_s:g}",
             remedy=f"on this curve the centre can do at most {math.floor(possible * 1000) / 1000:.3f} m/s",

@@ -8,6 +8,7 @@ import logging
 import time
 from io import FileIO
 from pathlib import Path
+from typing import Any
 
 from canhelm.errors import ConfigError
 from drivers.bus.candump import make_line
@@ -80,6 +81,16 @@ class CandumpRecorder:
         except OSError as error:
             self._fail(error)
         self._file = None
+
+    def status(self) -> dict[str, Any]:
+        """The log for ``status``."""
+        return {
+            "path": str(self.path),
+            "failing": self._failing,
+            "frames": self.frames,
+            "lost": self.lost,
+            "errors": self.errors,
+        }
 
     def _create(self) -> FileIO:
         if self.path.suffix == ".log":

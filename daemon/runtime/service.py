@@ -9,6 +9,7 @@ from typing import Any
 
 from daemon.runtime.commands import Commands
 from daemon.runtime.cycle import Cycle
+from daemon.runtime.recorder import CandumpRecorder
 from daemon.runtime.supervisor import Supervisor
 from drivers.bus.contract import Bus
 
@@ -24,10 +25,14 @@ class Service:
         commands: the methods.
         bus: for load and counters.
         cycle: for its counters.
+
+    Attributes:
+        recorder: of every frame; None where nothing is recorded.
     """
 
     def __init__(self, robot: str, supervisor: Supervisor, commands: Commands, bus: Bus, cycle: Cycle) -> None:
         self.robot = robot
+        self.recorder: CandumpRecorder | None = None
         self.call = commands.call
         self.open_lease = supervisor.open_lease
         self.renew_lease = supervisor.renew_lease
@@ -66,6 +71,7 @@ class Service:
             "motions": [motion.summary() for motion in supervisor.motions.values()],
             "bus": self._bus_status(),
             "cycle": self._cycle_status(),
+            "recording": self.recorder.status() if self.recorder else None,
             "events": supervisor.log.last(EVENTS_SHOWN),
         }
 
@@ -83,6 +89,7 @@ class Service:
         counters = self._cycle.counters
         return {
             "hz": round(1.0 / self._cycle.period_s, 3),
+            "achieved_hz": round(counters.achieved_hz, 2),
             "cycles": counters.cycles,
             "late_cycles": counters.late_cycles,
             "incomplete_cycles": counters.incomplete,

@@ -82,7 +82,15 @@ class Stopping:
             return f"emergency stop: {self.estop_reason}; reset by `canhelm reset`"
         if self.cause is None:
             return ""
+        if self._cause_is_gone:
+            return f"stopped by a fault that is gone: {self.cause.message}; drives again after `canhelm reset`"
         return f"{self.cause.message}; after the cause is gone: `canhelm reset`"
+
+    @property
+    def _cause_is_gone(self) -> bool:
+        """Whether the node that was at fault is there again and has no fault any more."""
+        device = self._devices.by_node.get(self.cause.node or 0) if self.cause else None
+        return device is not None and device.node_state is NodeState.READY and device.fault is None
 
     def require_none(self) -> None:
         """Raise EmergencyStop or NotReady while the vehicle is stopped, or about to be."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from canhelm.errors import DeviceFault
 from drivers.canopen.master import NodeEvent
 from drivers.contract import Device, NodeState
@@ -9,6 +11,8 @@ from drivers.devices import Devices
 
 SILENT_CYCLES = 5
 """Cycles without a reading after which a node counts as silent while something moves."""
+LATE_CYCLES = 2
+"""Cycles between two looks from which on the daemon itself counts as late."""
 
 
 class DeviceWatch:
@@ -22,7 +26,11 @@ class DeviceWatch:
     def __init__(self, devices: Devices, period_s: float) -> None:
         self._devices = tuple(devices.by_node.values())
         self._by_node = devices.by_node
+        self._period_s = period_s
         self._silent_s = SILENT_CYCLES * period_s
+        self._looked_s: float | None = None
+        self._stall_end_s = -math.inf
+        self._stall_s = 0.0
 
     def look(self, now_s: float, *, powered: bool) -> DeviceFault | None:
         """The fault that stops the vehicle, or None.
@@ -32,12 +40,15 @@ class DeviceWatch:
             powered: whether a motion runs or any drive has its power stage on. While nothing is powered, a node that
                 goes away is waited for and needs no reset.
         """
+        if self._looked_s is not None and now_s - self._looked_s > LATE_CYCLES * self._period_s:
+            self._stall_end_s, self._stall_s = now_s, now_s - self._looked_s - self._period_s
+        self._looked_s = now_s
         for device in self._devices:
             fault = device.fault
             if fault is not None and (powered or fault.code != 0):
                 return DeviceFault(fault.message, node=fault.node, value=fault.code or None, remedy=fault.remedy)
             if powered and device.node_state is NodeState.READY and now_s - device.reading_time_s > self._silent_s:
-                return _silence(device, now_s)
+                return self._silence(device, f"{device.who} is silent", now_s, "check its power and the CAN cable")
         return None
 
     def lost(self, event: NodeEvent) -> DeviceFault | None:
@@ -45,18 +56,12 @@ class DeviceWatch:
         device = self._by_node.get(event.node)
         if event.kind not in ("lost", "rebooted") or device is None:
             return None
-        silent_ms = (event.time_s - device.reading_time_s) * 1e3
-        return DeviceFault(
-            f"{event.message}; stop commanded {silent_ms:.0f} ms after its last reading",
-            node=event.node,
-            remedy=event.remedy,
-        )
+        return self._silence(device, event.message, event.time_s, event.remedy)
 
-
-def _silence(device: Device, now_s: float) -> DeviceFault:
-    silent_ms = (now_s - device.reading_time_s) * 1e3
-    return DeviceFault(
-        f"node {device.node} ({device.name}) is silent; stop commanded {silent_ms:.0f} ms after its last reading",
-        node=device.node,
-        remedy="check its power and the CAN cable",
-    )
+    def _silence(self, device: Device, what: str, now_s: float, remedy: str) -> DeviceFault:
+        """The fault; it tells where the daemon was late itself since the last reading, as then nobody listened."""
+        what = f"{what}; stop commanded {(now_s - device.reading_time_s) * 1e3:.0f} ms after its last reading"
+        if self._stall_end_s >= device.reading_time_s:
+            what = f"{what}; the daemon itself was {self._stall_s * 1e3:.0f} ms late meanwhile"
+            remedy = f"look for what loads this machine: `canhelm doctor`; else {remedy}"
+        return DeviceFault(what, node=device.node, remedy=remedy)

@@ -77,6 +77,23 @@ def test_more_than_one_late_cycle_in_a_thousand_is_a_problem(late: int, verdict:
     assert findings(cycle={"cycles": 10_000, "late_cycles": late})["cycle"].verdict == verdict
 
 
+def test_a_cycle_that_was_late_by_more_than_a_period_is_noted() -> None:
+    found = findings(cycle={"cycles": 10_000, "late_cycles": 1, "hz": 100.0, "max_lateness_ms": 63.25})["cycle"]
+    assert (found.verdict, "63.2 ms late" in found.finding) == ("note", True)
+
+
+@pytest.mark.parametrize(
+    ("recording", "verdict"),
+    [
+        ({"failing": False, "lost": 0, "frames": 10}, "ok"),
+        ({"failing": True, "lost": 0, "frames": 10}, "problem"),
+        ({"failing": False, "lost": 3, "frames": 10}, "note"),
+    ],
+)
+def test_a_log_that_cannot_be_written_is_told(recording: dict[str, Any], verdict: str) -> None:
+    assert findings(recording={"path": "run.log", **recording})["recording"].verdict == verdict
+
+
 def test_dropped_frames_are_a_problem() -> None:
     found = findings(bus={"load": 0.2, "dropped_full": 3})["bus"]
     assert (found.verdict, found.finding) == ("problem", "dropped_full 3")

@@ -114,6 +114,28 @@ async def test_a_fault_of_a_drive_stops_the_vehicle_and_says_cause_and_cure() ->
         assert (await robot.call("reset"))["state"] == "idle"
 
 
+async def test_a_fault_that_was_reset_at_its_drive_is_told_as_gone() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        drive = robot.network.node(2)
+        assert isinstance(drive, SimulatedEpos)
+        drive.trigger_fault(0x4210)
+        await robot.until(lambda: robot.state == "fault")
+        await robot.call("motor.reset", node=2)
+        message = robot.app.service.status()["message"]
+        assert message.startswith("stopped by a fault that is gone: node 2")
+        assert "`canhelm reset`" in message
+
+
+async def test_a_stop_says_which_drives_are_still_enabled() -> None:
+    async with running_robot() as robot:
+        await robot.call("motor.enable", node=1)
+        answer = await robot.call("stop")
+        assert (answer["state"], answer["enabled"]) == ("active", ["rear_right"])
+        assert "`canhelm motor disable rear_right`" in answer["message"]
+        await robot.call("motor.disable", node=1)
+        assert await robot.call("stop") == {"state": "idle"}
+
+
 async def test_a_daemon_that_hangs_is_lost_to_its_drives_which_stop_by_themselves() -> None:
     async with running_robot(expect_errors=True) as robot:
         driving = await _drive(robot)

@@ -1,0 +1,58 @@
+"""Which silence stops the vehicle, and whom it blames."""
+
+from __future__ import annotations
+
+import pytest
+
+from daemon.app import App
+from daemon.runtime.watch import DeviceWatch
+from drivers.canopen.master import NodeEvent
+from drivers.contract import NodeState
+from drivers.devices import Devices
+from profiles.loader import load
+
+PERIOD_S = 0.01
+
+
+@pytest.fixture
+def devices() -> Devices:
+    """All six nodes of a MAX2D, ready, read at 1.000 s."""
+    devices = App(load("max2d").profile).devices
+    for device in devices.by_node.values():
+        device.node_state = NodeState.READY
+        device.reading_time_s = 1.0
+    return devices
+
+
+def watching(devices: Devices, *looks_s: float) -> str:
+    """What is found at the last look."""
+    watch = DeviceWatch(devices, PERIOD_S)
+    faults = [watch.look(now_s, powered=True) for now_s in looks_s]
+    return str(faults[-1])
+
+
+def test_a_node_that_was_read_lately_is_not_silent(devices: Devices) -> None:
+    assert watching(devices, 1.0, 1.01, 1.02, 1.03, 1.04) == "None"
+
+
+def test_a_silent_node_is_to_be_looked_for_on_the_cable(devices: Devices) -> None:
+    told = watching(devices, *(1.0 + PERIOD_S * number for number in range(7)))
+    assert "node 1 (rear_right) is silent; stop commanded 60 ms after its last reading (check its power" in told
+
+
+def test_a_daemon_that_was_late_itself_says_so(devices: Devices) -> None:
+    told = watching(devices, 1.0, 1.08)
+    assert "the daemon itself was 70 ms late meanwhile (look for what loads this machine" in told
+
+
+def test_a_lateness_before_the_last_reading_is_no_excuse(devices: Devices) -> None:
+    told = watching(devices, 0.9, 0.98, 0.99, *(1.0 + PERIOD_S * number for number in range(7)))
+    assert "late" not in told
+
+
+def test_a_lost_node_is_not_blamed_for_the_daemons_lateness_either(devices: Devices) -> None:
+    watch = DeviceWatch(devices, PERIOD_S)
+    for now_s in (1.0, 1.25):
+        watch.look(now_s, powered=False)
+    event = NodeEvent(1.26, 1, "rear_right", "lost", "error", "node 1 is lost", "check the cable")
+    assert "stop commanded 260 ms after its last reading; the daemon itself was 240 ms late" in str(watch.lost(event))
