@@ -75,6 +75,10 @@ class Device(Protocol):
     reading_time_s: float
     """Loop time of the last reading; ``-inf`` before the first."""
 
+    def require_ready(self) -> None:
+        """Raise NodeAbsent or NotReady unless the node is configured, started and guarded."""
+        ...
+
     def status(self) -> dict[str, Any]:
         """Everything about the device for ``canhelm status``; keys carry units."""
         ...

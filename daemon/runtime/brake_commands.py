@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from canhelm.errors import Interlock, NotReady, Refused
+from canhelm.errors import Interlock, UsageError
 from daemon.runtime.handlers import Handler, Params
 from daemon.runtime.supervisor import Supervisor
 from drivers.contract import Brake, BrakeState, DriveState
@@ -31,7 +31,8 @@ class BrakeCommands:
         if pair == "all":
             return list(brakes.values())
         if pair not in brakes:
-            raise Refused(f"no brake {pair} in this profile", remedy=f"brakes: {', '.join(brakes) or 'none'}, or all")
+            have = ", ".join(brakes) or "none"
+            raise UsageError(f"no brake {pair} in this profile", value=pair, remedy=f"brakes: {have}, or all")
         return [brakes[pair]]
 
     async def _engage(self, params: Params, lease: str | None) -> dict[str, Any]:
@@ -39,7 +40,7 @@ class BrakeCommands:
             raise Interlock("a motion is running and holds the brakes", remedy="`canhelm stop` first")
         brakes = self._brakes(params)
         for brake in brakes:
-            await self._require_drive_of(brake)
+            self._supervisor.devices.drives[brake.drive].require_ready()
             await brake.engage()
         return {"brakes": [brake.status() for brake in brakes]}
 
@@ -47,7 +48,7 @@ class BrakeCommands:
         brakes, force = self._brakes(params), bool(params.get("force", False))
         for brake in brakes:
             self._check_release(brake, len(brakes), force=force)
-            await self._require_drive_of(brake)
+            self._supervisor.devices.drives[brake.drive].require_ready()
         for brake in brakes:
             self._check_release(brake, len(brakes), force=force)  # something may have begun while another one opened
             await brake.release()
@@ -72,11 +73,6 @@ class BrakeCommands:
                 f"the {brake.name} steering brake is not released while a drive is enabled and another pair is free",
                 remedy="disable the drives, or release one pair with the other engaged",
             )
-
-    async def _require_drive_of(self, brake: Brake) -> None:
-        drive = self._supervisor.devices.drives[brake.drive]
-        if drive.state is DriveState.UNKNOWN:
-            raise NotReady(f"the {brake.name} brake hangs on {drive.name}: {drive.status_sentence}", node=drive.node)
 
     async def _status(self, params: Params, lease: str | None) -> dict[str, Any]:
         return {"brakes": [brake.status() for brake in self._brakes(params)]}

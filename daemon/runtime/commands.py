@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from canhelm.errors import Refused
+from canhelm.errors import NodeAbsent, Refused
 from daemon.runtime.brake_commands import BrakeCommands
 from daemon.runtime.config_commands import ConfigCommands
-from daemon.runtime.handlers import Handler, Params, holder, run_motion
+from daemon.runtime.handlers import Handler, Params, holder, node_number, run_motion
 from daemon.runtime.motions import Motion
 from daemon.runtime.motor_commands import MotorCommands
 from daemon.runtime.network_commands import NetworkCommands
 from daemon.runtime.node_commands import NodeCommands
 from daemon.runtime.supervisor import Supervisor
+from drivers.contract import DriveState
 
 
 class Commands:
@@ -67,7 +68,16 @@ class Commands:
 
     async def _stop(self, params: Params, lease: str | None) -> dict[str, Any]:
         await self._supervisor.stop("stop was commanded")
-        return {"state": self._supervisor.state.value}
+        return {"state": self._supervisor.state.value, **self._still_enabled()}
+
+    def _still_enabled(self) -> Params:
+        """Who has power after a stop, and how to take it away: a stop leaves the drives as they were."""
+        drives = self._supervisor.devices.drives.values()
+        names = [drive.name for drive in drives if drive.state is DriveState.ENABLED]
+        if not names:
+            return {}
+        mend = ", ".join(f"`canhelm motor disable {name}`" for name in names)
+        return {"enabled": names, "message": f"at rest, and still enabled; {mend} switches off"}
 
     async def _estop(self, params: Params, lease: str | None) -> dict[str, Any]:
         self._supervisor.estop(str(params.get("reason") or "commanded by a person"))
@@ -104,8 +114,17 @@ class Commands:
         await motion.closed.wait()
         return {"motion": motion.identity, "state": self._supervisor.state.value}
 
+    def _member(self, node: int | str) -> int:
+        number = node_number(self._supervisor, node)
+        if number not in self._supervisor.devices.by_node:
+            raise NodeAbsent(
+                f"no node {number} is simulated", node=number, remedy="`canhelm status` lists the nodes of the profile"
+            )
+        return number
+
     async def _simulation_power(self, params: Params, lease: str | None) -> dict[str, Any]:
         if self._power is None:
             raise Refused("this network is real: its power is switched by hand")
-        self._power(params["node"], bool(params["on"]))
+        node = "all" if params["node"] == "all" else self._member(params["node"])
+        self._power(node, bool(params["on"]))
         return {"node": params["node"], "on": bool(params["on"])}

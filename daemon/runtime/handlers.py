@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-from canhelm.errors import UsageError
+from canhelm.errors import NodeAbsent, UsageError
 from daemon.runtime.motions import Motion
 from daemon.runtime.supervisor import Supervisor
 
@@ -19,6 +19,16 @@ async def run_motion(supervisor: Supervisor, motion: Motion, params: Params) -> 
     if motion.streaming or not params.get("wait", True):
         return {"motion": motion.identity}
     return {"motion": motion.identity, **await motion.result()}
+
+
+def node_number(supervisor: Supervisor, node: int | str) -> int:
+    """The node id that a person means by an id or a name. Raises NodeAbsent for a name that the profile has not."""
+    if isinstance(node, int) or node.isdigit():
+        return int(node)
+    for number, device in supervisor.devices.by_node.items():
+        if device.name == node:
+            return number
+    raise NodeAbsent(f"no node {node} in this profile", remedy="`canhelm status` lists the nodes")
 
 
 def holder(params: Params, lease: str | None, *, endless: bool = False) -> str | None:

@@ -141,8 +141,7 @@ class MotorCommands:
 
     def _present(self, params: Params) -> Drive:
         drive = self.drive(params["node"])
-        if drive.state is DriveState.UNKNOWN:
-            raise NodeAbsent(drive.status_sentence, node=drive.node, remedy="`canhelm status` shows every node")
+        drive.require_ready()
         return drive
 
     def _wheels(self) -> int:

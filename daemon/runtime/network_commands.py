@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from canhelm.errors import Aborted, NodeAbsent, UsageError
-from daemon.runtime.handlers import Handler, Params
+from canhelm.errors import Aborted, UsageError
+from daemon.runtime.handlers import Handler, Params, node_number
 from daemon.runtime.interlocks import require_all_disabled, require_write_allowed
 from daemon.runtime.supervisor import Supervisor
 from drivers.canopen.codes import NmtCommand
 from drivers.canopen.objects import ObjectDef, ObjectTable, parse_address
 from drivers.encoder.objects import OBJECTS as ENCODER_OBJECTS
+from drivers.epos.codes import VALUE_TABLES
 from drivers.epos.commissioning import ABSENT
 from drivers.epos.objects import OBJECTS as EPOS_OBJECTS
+from drivers.epos.state_machine import state_of
 
 NMT_COMMANDS = {
     "start": NmtCommand.START,
@@ -38,20 +40,14 @@ class NetworkCommands:
             "sdo.write": self._sdo_write,
         }
 
-    def _node(self, node: int | str) -> int:
-        if isinstance(node, int) or str(node).isdigit():
-            return int(node)
-        for number, device in self._supervisor.devices.by_node.items():
-            if device.name == node:
-                return number
-        raise NodeAbsent(f"no node {node} in this profile", remedy="`canhelm status` lists the nodes")
-
     async def _nmt(self, params: Params, lease: str | None) -> dict[str, Any]:
         require_all_disabled(self._supervisor)
         command = NMT_COMMANDS[str(params["command"])]
-        node = 0 if params["node"] == "all" else self._node(params["node"])
+        node = 0 if params["node"] == "all" else node_number(self._supervisor, params["node"])
         self._supervisor.master.nmt(command, node)
-        return {"node": params["node"], "command": params["command"]}
+        known = not node or node in self._supervisor.devices.by_node
+        note = {} if known else {"note": f"node {node} is not in the profile, and no node confirms such a command"}
+        return {"node": params["node"], "command": params["command"], **note}
 
     def _object(self, node: int, text: str) -> ObjectDef | tuple[int, int]:
         found = self._table(node).find(text)
@@ -71,7 +67,7 @@ class NetworkCommands:
         return EPOS_OBJECTS
 
     async def _sdo_read(self, params: Params, lease: str | None) -> dict[str, Any]:
-        node = self._node(params["node"])
+        node = node_number(self._supervisor, params["node"])
         wanted = self._object(node, str(params["object"]))
         client = self._supervisor.master.sdo(node)
         if isinstance(wanted, ObjectDef):
@@ -81,20 +77,20 @@ class NetworkCommands:
                 raise self._absent(node, wanted, error) or error from None
             shown = value.hex() if isinstance(value, bytes) else value
             return {"node": node, "object": wanted.address, "name": wanted.name, "value": shown,
-                    "type": wanted.type.name.lower(), "unit": wanted.unit}  # fmt: skip
+                    **_readings(wanted, value), "type": wanted.type.name.lower(), "unit": wanted.unit}  # fmt: skip
         raw = await client.read_raw(wanted)
         return {"node": node, "object": f"0x{wanted[0]:04X}/{wanted[1]}", "raw": raw.hex(),
                 "value": int.from_bytes(raw, "little")}  # fmt: skip
 
     async def _sdo_write(self, params: Params, lease: str | None) -> dict[str, Any]:
-        node = self._node(params["node"])
+        node = node_number(self._supervisor, params["node"])
         wanted = self._object(node, str(params["object"]))
         if not isinstance(wanted, ObjectDef):
             raise UsageError(
                 f"{params['object']} is in no table, so its type is unknown",
                 remedy="`canhelm object list` shows what can be written",
             )
-        value = _as_number(wanted, params["value"])
+        value = _as_typed(wanted, params["value"])
         require_write_allowed(self._supervisor, node, wanted.index, value if isinstance(value, int) else 0)
         try:
             await self._supervisor.master.sdo(node).write(wanted, value)
@@ -117,13 +113,29 @@ class NetworkCommands:
         )
 
 
-def _as_number(wanted: ObjectDef, value: int | str) -> int | str:
-    """A number that a person typed, for objects that are numbers. Raises UsageError where it is none."""
-    if not wanted.type.bits or isinstance(value, int):
+def _readings(wanted: ObjectDef, value: int | str | bytes) -> dict[str, str]:
+    """A number in hexadecimal, and in words where its values have a meaning each."""
+    if not isinstance(value, int):
+        return {}
+    bits = wanted.type.bits
+    reading = {"hex": f"0x{value & (1 << bits) - 1:0{bits // 4}X}"}
+    state = state_of(value) if wanted.name == "statusword" else None
+    words = state.words if state is not None else VALUE_TABLES.get(wanted.name, {}).get(value)
+    return reading if words is None else {**reading, "words": words}
+
+
+def _as_typed(wanted: ObjectDef, value: float | str) -> int | str:
+    """What a person typed in the type of an object. Raises UsageError where it is no whole number, but should be."""
+    if not wanted.type.bits:
+        return str(value)
+    if isinstance(value, int):
         return value
     try:
-        return int(value, 0)
+        return int(str(value), 0)
     except ValueError:
         raise UsageError(
-            f"{value!r} is no number", object=wanted.address, value=value, remedy=f"{wanted.name} takes a number"
+            f"{value!r} is no whole number",
+            object=wanted.address,
+            value=value,
+            remedy=f"{wanted.name} takes a whole number",
         ) from None

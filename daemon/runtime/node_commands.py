@@ -8,7 +8,7 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 from canhelm.errors import Aborted, NodeAbsent, Refused, Timeout
-from daemon.runtime.handlers import Handler, Params
+from daemon.runtime.handlers import Handler, Params, node_number
 from daemon.runtime.interlocks import require_all_disabled
 from daemon.runtime.node_report import FIRMWARE, bit_rate_remark, missing_entry, node_entry
 from daemon.runtime.supervisor import Supervisor
@@ -48,14 +48,6 @@ class NodeCommands:
             "lss.set_node_id": self._lss_set_node_id,
             "lss.set_bit_rate": self._lss_set_bit_rate,
         }
-
-    def _number(self, node: int | str) -> int:
-        if isinstance(node, int) or node.isdigit():
-            return int(node)
-        for number, device in self._supervisor.devices.by_node.items():
-            if device.name == node:
-                return number
-        raise NodeAbsent(f"no node {node} in this profile", remedy="`canhelm nodes scan` shows who is on the bus")
 
     # --- scan ----------------------------------------------------------------------------------------------------
 
@@ -97,12 +89,12 @@ class NodeCommands:
         return await self._work_on_memory(params, STORE, "it keeps its parameters from now on")
 
     async def _restore(self, params: Params, lease: str | None) -> dict[str, Any]:
-        node = self._number(params["node"])
+        node = node_number(self._supervisor, params["node"])
         note = f"its factory values count after a restart: `canhelm nmt reset {node}`"
         return await self._work_on_memory(params, RESTORE, note)
 
     async def _work_on_memory(self, params: Params, command: tuple[int, int], note: str) -> dict[str, Any]:
-        node = self._number(params["node"])
+        node = node_number(self._supervisor, params["node"])
         require_all_disabled(self._supervisor)
         _require_confirmation(params, f"the memory of node {node} is written")
         async with self._out_of_operation(node):
@@ -188,7 +180,7 @@ class NodeCommands:
         """Change and store something in one device; its node id before, or None where it was named by its identity."""
         identity, node = parse_identity(device), None
         if identity is None:
-            node = self._number(int(device, 0) if device.lower().startswith("0x") else device)
+            node = node_number(self._supervisor, int(device, 0) if device.lower().startswith("0x") else device)
             identity = await self._identity_of(node)
         async with self._lss_turn, self._stopped(node):
             lss = self._supervisor.master.lss

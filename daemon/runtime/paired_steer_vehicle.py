@@ -6,7 +6,7 @@ import asyncio
 import math
 from typing import Any
 
-from canhelm.errors import DeviceFault, Interlock, NotReady, Refused, UsageError
+from canhelm.errors import DeviceFault, Interlock, Refused, UsageError
 from daemon.loops.geometry import PAIR_NAMES
 from daemon.loops.measurement import Command, Measurement
 from daemon.loops.odometry import Odometry
@@ -22,7 +22,7 @@ from daemon.loops.paired_steer_target import (
 )
 from daemon.runtime.motions import Motion
 from daemon.runtime.vehicle import Vehicle
-from drivers.contract import Brake, Drive, NodeState, SteeringEncoder
+from drivers.contract import Brake, Drive, SteeringEncoder
 from profiles.schema import PairedSteerGeometry, Profile
 
 STREAM_END_S = 2.0
@@ -187,9 +187,7 @@ class PairedSteerVehicle(Vehicle):
         """A single wheel turns only with both steering brakes engaged; the law engages them, and needs the headings."""
         if isinstance(motion, PairedSteerMotion):
             for encoder in self.encoders:
-                if encoder.node_state is not NodeState.READY:
-                    remedy = "`canhelm status` shows every node"
-                    raise NotReady(encoder.status_sentence, node=encoder.node, remedy=remedy)
+                encoder.require_ready()
             return
         loose = [brake.name for brake in self.brakes if brake.state != "engaged"]
         if loose:

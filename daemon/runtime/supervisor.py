@@ -11,7 +11,7 @@ import logging
 from collections.abc import Callable
 from typing import Any
 
-from canhelm.errors import CanhelmError, DeviceFault, NotReady, Refused
+from canhelm.errors import CanhelmError, DeviceFault, Refused
 from daemon.loops.measurement import Command, Measurement
 from daemon.runtime.events import EventLog
 from daemon.runtime.leases import Leases
@@ -102,18 +102,16 @@ class Supervisor:
     # --- motions -----------------------------------------------------------------------------------------------
 
     def require_ready(self, drives: tuple[str, ...]) -> None:
-        """Raise EmergencyStop, NotReady or Refused where these drives may not be moved now."""
+        """Raise EmergencyStop, NodeAbsent or NotReady where these drives may not be moved now."""
         self._stopping.require_none()
         for name in drives:
-            drive = self.devices.drives[name]
-            if drive.node_state is not NodeState.READY:
-                raise NotReady(drive.status_sentence, node=drive.node, remedy="`canhelm status` shows every node")
+            self.devices.drives[name].require_ready()
 
     def admit(self, motion: Motion) -> None:
         """Let a motion begin.
 
         Raises:
-            EmergencyStop, NotReady: as :meth:`require_ready`.
+            EmergencyStop, NodeAbsent, NotReady: as :meth:`require_ready`.
             Refused: its drives are busy, or its lease has run out.
             Interlock: a brake stands against it.
         """

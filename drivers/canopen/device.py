@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Awaitable, Callable
 from typing import Any, NamedTuple
 
-from canhelm.errors import NotReady
+from canhelm.errors import NodeAbsent, NotReady
 from drivers.canopen.master import Master
 from drivers.contract import Fault, NodeState
 
@@ -88,13 +88,15 @@ class CanopenDevice(ABC):
         return Fault(self.name, self.node, code, message, remedy)
 
     def require_ready(self) -> None:
-        """Raise NotReady unless the node is configured, started and guarded."""
-        if self.node_state is not NodeState.READY:
-            raise NotReady(
-                self.status_sentence or f"{self.who} was not started yet",
-                node=self.node,
-                remedy="`canhelm status` shows what it waits for",
-            )
+        """Raise NodeAbsent or NotReady unless the node is configured, started and guarded."""
+        if self.node_state is NodeState.READY:
+            return
+        failure = NodeAbsent if self.node_state is NodeState.ABSENT else NotReady
+        raise failure(
+            self.status_sentence or f"{self.who} was not started yet",
+            node=self.node,
+            remedy="`canhelm status` shows what it waits for",
+        )
 
     def status(self) -> dict[str, Any]:
         """Everything about the device for people and programs; keys carry units."""

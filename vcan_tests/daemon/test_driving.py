@@ -159,3 +159,18 @@ async def test_a_second_motion_is_refused_while_one_runs() -> None:
         with pytest.raises(Refused, match="running"):
             await robot.call("drive.parallel", angle_deg=0.0, speed_m_s=0.2, duration_s=3.0)
         assert (await robot.call("motion.wait", motion=first["motion"]))["motion"] == first["motion"]
+
+
+async def test_a_position_move_beyond_the_wheels_limit_is_refused_with_unit_and_remedy() -> None:
+    async with running_robot() as robot:
+        with pytest.raises(LimitExceeded, match="99999 rpm is beyond") as refused:
+            await robot.call("motor.position", node=1, position_qc=100, velocity_rpm=99_999.0)
+        assert "rpm at the motor" in refused.value.limit
+        assert refused.value.remedy is not None
+
+
+async def test_a_current_beyond_the_motors_is_refused_with_a_remedy() -> None:
+    async with running_robot() as robot:
+        with pytest.raises(LimitExceeded, match="20000 mA") as refused:
+            await robot.call("motor.current", node=1, current_ma=20_000.0)
+        assert refused.value.remedy is not None

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from canhelm.errors import CanhelmError, DeviceFault, Interlock, NotReady, Refused
+from canhelm.errors import CanhelmError, DeviceFault, Interlock, NodeAbsent, NotReady, Refused
 from drivers.contract import BrakeState
 from drivers.simulated.epos import SimulatedEpos
 from vcan_tests.robot import Robot, running_robot
@@ -159,7 +159,7 @@ async def test_a_pair_is_not_steered_without_the_reading_of_its_encoder() -> Non
         for node in (1, 2, 3, 4, 5):
             robot.network.power_on(node)
         await robot.until(lambda: robot.app.devices.brakes["front"].state is BrakeState.ENGAGED)
-        with pytest.raises(NotReady, match="front"):
+        with pytest.raises(NodeAbsent, match="front"):
             await robot.call("steer", pair="front", angle_deg=10.0)
         assert robot.network.world.heading_rad("front") == 0.0
 

@@ -7,7 +7,7 @@ import asyncio
 import msgspec
 import pytest
 
-from canhelm.errors import NotReady, Refused
+from canhelm.errors import NodeAbsent, Refused
 from drivers.contract import BrakeState
 from profiles.schema import Profile
 from vcan_tests.drivers.bench import bench, max2d
@@ -92,7 +92,7 @@ async def test_without_its_drive_its_state_is_unknown_and_it_cannot_be_switched(
         b.network.power_off(3)
         await asyncio.sleep(0.3)
         assert b.brake().state is BrakeState.UNKNOWN
-        with pytest.raises(NotReady):
+        with pytest.raises(NodeAbsent):
             await b.brake().release()
 
 

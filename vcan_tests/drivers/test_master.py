@@ -8,7 +8,7 @@ import random
 import msgspec
 import pytest
 
-from canhelm.errors import NotReady, UsageError
+from canhelm.errors import NodeAbsent, NotReady, UsageError
 from drivers.bus.contract import RTR_FLAG
 from drivers.contract import NodeState
 from drivers.epos.objects import OBJECTS
@@ -78,7 +78,7 @@ async def test_without_power_it_says_what_it_waits_for() -> None:
     async with bench(powered=False) as b:
         await asyncio.sleep(1.0)
         assert b.drive().status_sentence == "waiting for node 3 (front_left): no boot-up; is motor power on?"
-        with pytest.raises(NotReady, match="is motor power on"):
+        with pytest.raises(NodeAbsent, match="is motor power on"):
             await b.drive().enable()
 
 
