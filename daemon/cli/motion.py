@@ -79,7 +79,7 @@ def progress_line(client: Client) -> Iterator[None]:
 def _draw(method: str, params: dict[str, Any]) -> None:
     if method == "status":
         width = shutil.get_terminal_size().columns - 1
-        print(f"{CLEAR_LINE}{progress_text(params)[:width]}", end="", file=sys.stderr, flush=True)
+        print(f"{CLEAR_LINE}{cut(progress_text(params), width)}", end="", file=sys.stderr, flush=True)
     elif method == "event" and params.get("severity") != "info":
         print(CLEAR_LINE, end="", file=sys.stderr)
         say(str(params.get("message")))
@@ -92,5 +92,13 @@ def progress_text(status: dict[str, Any]) -> str:
 
 
 def _progress(motion: dict[str, Any]) -> str:
-    rest = {key: value for key, value in motion.items() if key not in ("motion", "kind", "drives")}
-    return f"{motion.get('kind')}: {words(rest, digits=3)}"
+    """Words as they are, then numbers, then lists; without what is empty or zero."""
+    told = [(key, value) for key, value in motion.items() if value and key not in ("motion", "kind", "drives")]
+    told.sort(key=lambda item: isinstance(item[1], list) - isinstance(item[1], str))
+    parts = [value if isinstance(value, str) else f"{key} {words(value, digits=3)}" for key, value in told]
+    return f"{motion.get('kind')}: {', '.join(parts)}"
+
+
+def cut(text: str, width: int) -> str:
+    """A line that is too long, cut after a whole item."""
+    return text if len(text) <= width else text[: width + 1].rpartition(",")[0]

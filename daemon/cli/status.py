@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
@@ -11,7 +12,7 @@ from daemon.cli.options import DEFAULT, Options
 from daemon.cli.output import show, words
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
+    from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
     from rich.table import Table
 
 COLUMNS = {
@@ -25,6 +26,8 @@ COLUMNS = {
     "heading_deg": "heading °",
 }
 """Fields of a node that are shown, and the heads of their columns."""
+NARROW = 80
+"""A terminal with fewer columns than this does without the devices' types."""
 HIDDEN = ("type", "methods", "name", "bit_rate")
 """Fields of a section that do not change and are left to JSON."""
 SEVERE = ("fault", "estop", "refused", "absent", "error")
@@ -62,7 +65,9 @@ def table(data: Mapping[str, Any]) -> RenderableType:
     """The status for a terminal."""
     from rich.console import Group
 
-    parts: list[RenderableType] = [_headline(data), _nodes(data.get("nodes") or ()), _brakes(data.get("brakes") or ())]
+    nodes = data.get("nodes") or ()
+    parts: list[RenderableType] = [_headline(data), _NodeTable(nodes), *_troubles(nodes)]
+    parts.append(_brakes(data.get("brakes") or ()))
     parts += [
         _section(title, data[title]) for title in ("vehicle", "motions", "cycle", "bus", "recording") if data.get(title)
     ]
@@ -86,20 +91,38 @@ def _colour(state: str) -> str:
     return "yellow" if state in BUSY else "green"
 
 
-def _nodes(nodes: Sequence[Mapping[str, Any]]) -> Table:
+@dataclass(frozen=True, slots=True)
+class _NodeTable:
+    """The nodes in a table that fits the terminal."""
+
+    nodes: Sequence[Mapping[str, Any]]
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        yield _nodes(self.nodes, narrow=options.max_width < NARROW)
+
+
+def _nodes(nodes: Sequence[Mapping[str, Any]], *, narrow: bool) -> Table:
     from rich.table import Table
     from rich.text import Text
 
     shown = [column for column in COLUMNS if any(column in node for node in nodes)]
-    grid = Table(box=None, header_style="bold", pad_edge=False)
+    if narrow and "device" in shown:
+        shown.remove("device")
+    grid = Table(box=None, header_style="bold", padding=(0, 1 if narrow else 2, 0, 0))
     for column in shown:
         grid.add_column(COLUMNS[column], no_wrap=True)
-    grid.add_column("")
     for node in nodes:
         cells = {column: words(node.get(column)) for column in shown}
         cells["state"] = _node_state(node)
-        grid.add_row(*(Text(cell, _style(column, cell)) for column, cell in cells.items()), Text(_trouble(node)))
+        grid.add_row(*(Text(cell, _style(column, cell)) for column, cell in cells.items()))
     return grid
+
+
+def _troubles(nodes: Sequence[Mapping[str, Any]]) -> list[RenderableType]:
+    from rich.text import Text
+
+    told = [(str(node.get("name")), _trouble(node)) for node in nodes]
+    return [Text.assemble((f"{name}: ", "bold red"), trouble) for name, trouble in told if trouble]
 
 
 def _node_state(node: Mapping[str, Any]) -> str:

@@ -11,7 +11,7 @@ import pytest
 from rich.console import Console
 
 from canhelm.errors import LimitExceeded
-from daemon.cli.motion import progress_text
+from daemon.cli.motion import cut, progress_text
 from daemon.cli.output import plain, say_error, show, words
 from daemon.cli.sdo import value_of
 from daemon.cli.status import table
@@ -33,9 +33,9 @@ STATUS: dict[str, Any] = {
 }  # fmt: skip
 
 
-def drawn(status: dict[str, Any]) -> str:
+def drawn(status: dict[str, Any], width: int = 120) -> str:
     text = io.StringIO()
-    Console(file=text, width=120).print(table(status))
+    Console(file=text, width=width).print(table(status))
     return text.getvalue()
 
 
@@ -54,7 +54,38 @@ def test_the_status_of_a_robot_without_nodes_is_drawn() -> None:
 
 def test_progress_is_what_the_motion_reports() -> None:
     motion = {"motion": "3", "kind": "drive.turn", "drives": ["a"], "phase": "drive", "remaining_m": 0.51234}
-    assert progress_text({"state": "active", "motions": [motion]}) == "drive.turn: phase drive, remaining_m 0.512"
+    assert progress_text({"state": "active", "motions": [motion]}) == "drive.turn: drive, remaining_m 0.512"
+
+
+TURNING = {
+    "motion": "1", "kind": "steer", "drives": ["a"], "phase": "turning_pair", "pair": "front", "speed_m_s": 0.0,
+    "heading_error_deg": [0.0, 0.2931], "icr_m": None, "warnings": [], "mismatch_deg": [0.0, 0.0, 0.0, 0.0],
+}  # fmt: skip
+
+
+def test_progress_shows_its_numbers_on_sixty_columns() -> None:
+    line = cut(progress_text({"motions": [TURNING]}), 59)
+    assert line == "steer: turning_pair, front, heading_error_deg 0, 0.293"
+
+
+def test_a_line_that_is_too_long_is_cut_after_a_whole_item() -> None:
+    assert [cut("speed 0.4, way 0.9", width) for width in (18, 17, 9)] == [
+        "speed 0.4, way 0.9",
+        "speed 0.4",
+        "speed 0.4",
+    ]
+
+
+def test_sixty_columns_show_every_number_and_state_of_a_node() -> None:
+    node = {"node": 4, "name": "front_right", "device": "epos24_5", "node_state": "ready", "state": "quick_stop",
+            "velocity_rpm": -1250.0, "speed_m_s": -0.0028, "current_a": -1.129}  # fmt: skip
+    encoder = {"node": 6, "name": "front", "device": "cia406", "node_state": "ready", "heading_deg": -29.71}
+    head, *rows = drawn({"robot": "r", "state": "active", "nodes": [node, encoder]}, 60).splitlines()[1:4]
+    assert head.split() == ["node", "name", "state", "rpm", "m/s", "A", "heading", "°"]
+    assert [row.split() for row in rows] == [
+        ["4", "front_right", "quick_stop", "-1250", "-0.0028", "-1.129", "-"],
+        ["6", "front", "ready", "-", "-", "-", "-29.71"],
+    ]
 
 
 def test_several_objects_are_one_json_line_each(capsys: pytest.CaptureFixture[str]) -> None:
