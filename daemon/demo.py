@@ -188,7 +188,7 @@ class Demo:
         finally:
             app.supervisor.observers.remove(observer)
             renewing.cancel()
-            app.service.close_lease(lease)
+            app.service.close_lease(lease, "the demo is over")
         frames, cycles, late, busy_s = (now - then for now, then in zip(self._counts(), before, strict=True))
         duration_s = loop.time() - begin_s
         numbers: dict[str, Any] = {

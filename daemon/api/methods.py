@@ -440,7 +440,7 @@ def _check(method: Method, param: Param, params: dict[str, Any]) -> Any:
         return param.default
     fits, wanted = _TYPES[param.type]
     if not fits(value):
-        raise _wrong(method, param.name, f"is not {wanted}", value, f"give {wanted}: {param.doc}")
+        raise _wrong(method, param.name, f"is not {wanted}", value, f"{param.name}: {param.doc}")
     if param.choices and value not in param.choices:
         raise _wrong(method, param.name, "is none of its values", value, f"give {', '.join(param.choices)}")
     if param.type in ("number", "integer"):
@@ -464,7 +464,7 @@ def _digits(bound: float | None) -> str:
 
 
 def _wrong(method: Method, name: str, what: str, value: Any, remedy: str, limit: str | None = None) -> UsageError:
-    shown = "" if value is None else f" ({_short(value)})"
+    shown = "" if value is None else f" ({_short(value)!r})"
     return UsageError(
         f"{method.name}: {name}{shown} {what}", object=name, value=_short(value), limit=limit, remedy=remedy
     )

@@ -131,6 +131,12 @@ def test_a_failure_has_its_exit_code_and_a_sentence_on_stderr(
     assert (out, told in err, "Traceback" in err) == ("", True, False)
 
 
+@pytest.mark.usefixtures("server")
+def test_an_empty_argument_is_named_as_what_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["steer", "", "3"]) == 2
+    assert "pair ('') is not a string of 1 to 256 printable characters - pair: front or rear" in capsys.readouterr().err
+
+
 @pytest.mark.usefixtures("nobody")
 @pytest.mark.parametrize("line", ["status", "stop", "motor velocity 1 5", "monitor", "sdo read 1 0x6041"])
 def test_without_a_daemon_the_exit_code_is_3(capsys: pytest.CaptureFixture[str], line: str) -> None:
