@@ -65,6 +65,12 @@ def part(data: Any, key: str) -> dict[str, Any]:
     return value if isinstance(value, dict) else {}
 
 
+def _defined(data: dict[str, Any], kind: str) -> dict[str, Any] | None:
+    """What a part defines, by name; None where the part itself is a mistake, which the types tell."""
+    value = data.get(kind, {})
+    return value if isinstance(value, dict) and (value or kind != "drives") else None
+
+
 def _version(data: dict[str, Any]) -> Iterator[Finding]:
     version = data.get("schema_version")
     if isinstance(version, int) and version != SCHEMA_VERSION:
@@ -86,10 +92,11 @@ def _vehicle_names(data: dict[str, Any]) -> Iterator[Finding]:
     for key, kind in REFERENCES.items():
         names = part(data, "vehicle").get(key)
         names = names if isinstance(names, list) else []
+        known = _defined(data, kind)
         for index, name in enumerate(names):
             path = ("vehicle", key, index)
-            if name not in part(data, kind):
-                yield _unknown(path, kind, name, part(data, kind))
+            if known is not None and name not in known:
+                yield _unknown(path, kind, name, known)
             elif name in names[:index]:
                 yield Finding(path, f"{name!r} stands here twice", f"name each of {kind} once")
 
@@ -99,20 +106,21 @@ def _unknown(path: FieldPath, kind: str, name: Any, known: dict[str, Any]) -> Fi
 
 
 def _brakes(data: dict[str, Any]) -> Iterator[Finding]:
-    brakes, drives = part(data, "brakes"), part(data, "drives")
+    brakes, drives = part(data, "brakes"), _defined(data, "drives")
     wired: dict[tuple[str, int], str] = {}
     for name in brakes:
         brake = part(brakes, name)
         drive, output, bit = brake.get("drive"), brake.get("output", STRONG_OUTPUT), brake.get("output_bit", 12)
         if not (isinstance(drive, str) and isinstance(output, int) and isinstance(bit, int)):
             continue
-        if drive not in drives:
+        if drives is not None and drive not in drives:
             yield _unknown(("brakes", name, "drive"), "drives", drive, drives)
         other = wired.setdefault((drive, output), name)
         if other != name:
             what = f"output {output} of {drive} already switches {{other}}"
             yield Finding(("brakes", name), what, "give each brake its own output", other=("brakes", other))
-        yield from _wiring(name, output, bit)
+        if 1 <= output <= STRONG_OUTPUT:
+            yield from _wiring(name, output, bit)
 
 
 def _wiring(name: str, output: int, bit: int) -> Iterator[Finding]:
@@ -131,7 +139,7 @@ def _encoders(data: dict[str, Any]) -> Iterator[Finding]:
         encoder = part(part(data, "encoders"), name)
         per_turn = encoder.get("counts_per_turn")
         total, zero = encoder.get("total_counts") or per_turn, encoder.get("zero_counts", 0)
-        if not (isinstance(per_turn, int) and isinstance(total, int) and isinstance(zero, int)):
+        if not (isinstance(per_turn, int) and isinstance(total, int) and isinstance(zero, int)) or per_turn < 1:
             continue
         if total < per_turn:
             what = f"is {total}, less than one turn"

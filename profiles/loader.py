@@ -115,8 +115,10 @@ class Assembly:
         self._open: list[Path] = []
 
     def robot(self, path: Path) -> Node | None:
-        """The merged tree of a robot's file and its calibration side file."""
+        """The merged tree of a robot's file and its calibration side file; it has a name of its own."""
         tree = self._file(path)
+        if isinstance(tree, Mapping):
+            tree = _named(tree, path)
         side = path.with_name(path.stem + CALIBRATION)
         calibration = self._file(side) if side.is_file() else None
         return tree if tree is None or calibration is None else merge(tree, calibration)
@@ -177,6 +179,14 @@ class Assembly:
 
     def _wrong(self, place: Place, what: str, remedy: str) -> None:
         self.mistakes.append(Mistake(place, "extends", what, remedy))
+
+
+def _named(tree: Mapping, path: Path) -> Node:
+    """A robot whose own file gives it no name is called after that file, and not like the one that it extends."""
+    name = tree.entries.get("name")
+    if name is not None and name.place.file == str(path):
+        return tree
+    return merge(tree, Mapping({"name": Scalar(path.stem, tree.place)}, tree.place, {"name": tree.place}))
 
 
 def _candidates(name: str, path: Path) -> list[Path]:

@@ -20,6 +20,7 @@ ASSUMED = "!assumed"
 MAX_FILE_BYTES = 1_000_000
 MAX_DEPTH = 30
 LARGEST_INTEGER = 2**63 - 1
+NO_ALIASES = "aliases are not supported"
 
 
 Value: TypeAlias = str | int | float | bool | None
@@ -141,7 +142,7 @@ class _Composer(yaml.SafeLoader):
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         if self.check_event(yaml.AliasEvent):
-            raise self._refusal("aliases are not supported")
+            raise self._refusal(NO_ALIASES)
         if self.depth >= MAX_DEPTH:
             raise self._refusal("nested too deeply")
         self.depth += 1
@@ -198,9 +199,7 @@ class Reader:
         try:
             root = yaml.compose(text, Loader=_Composer)
         except yaml.MarkedYAMLError as error:
-            mark = error.problem_mark or error.context_mark
-            what = f"YAML: {error.problem or error.context}"
-            self._wrong(mark.line + 1 if mark else 1, what, "mend the syntax; share values with extends:, not aliases")
+            self._wrong(*_syntax_mistake(error, text))
             return None
         except yaml.reader.ReaderError as error:
             line = text[: error.position].count("\n") + 1
@@ -247,8 +246,20 @@ class Reader:
         try:
             return convert(text)
         except ValueError:
-            self._wrong(line, f"{_short(text)} is no {kind}", "write a number of ordinary size")
+            octal = re.match(r"[-+]?0[0-9]", text)
+            remedy = "write it without the zero in front" if octal else "write a number of ordinary size"
+            self._wrong(line, f"{_short(text)} is no {kind}", remedy)
             return None
+
+
+def _syntax_mistake(error: yaml.MarkedYAMLError, text: str) -> tuple[int, str, str]:
+    """Line, what is wrong, and the remedy."""
+    mark = error.problem_mark or error.context_mark
+    line = mark.line + 1 if mark else 1
+    if mark and text[mark.index : mark.index + 1] == "\t":
+        return line, "YAML: a tab stands where spaces belong", "indent with spaces"
+    remedy = "share values with extends:" if error.problem == NO_ALIASES else "mend the syntax"
+    return line, f"YAML: {error.problem or error.context}", remedy
 
 
 def _plain_kind(node: yaml.Node) -> str:
@@ -259,6 +270,9 @@ def _plain_kind(node: yaml.Node) -> str:
 
 
 def _integer(text: str) -> int:
+    """Not with a zero in front: some read that as octal."""
+    if re.fullmatch(r"[-+]?0[0-9]+", text):
+        raise ValueError(text)
     value = int(text, 16 if text.startswith("0x") else 10)
     if abs(value) > LARGEST_INTEGER:
         raise ValueError(text)

@@ -47,7 +47,7 @@ class Network(Part, frozen=True, kw_only=True):
     sdo_timeout_s: Positive = 0.25
     """Time a node has to answer one SDO request."""
     synchronous: bool = True
-    """PDOs go with SYNC; without it targets count at once and readings come on request (the RS-232 gateway does that)."""
+    """PDOs go with SYNC; without it targets count at once and readings come on request (as over the RS-232 gateway)."""
     gateway: str | None = None
     """Name of the drive that the RS-232 line is plugged into; None: the first one. Only used over RS-232."""
 
@@ -238,7 +238,7 @@ class Profile(Part, frozen=True, kw_only=True):
 
     schema_version: int
     name: Name
-    """Name of the robot; its socket is called after it."""
+    """Name of the robot; its socket is called after it. Left out: the name of its file."""
     description: str = ""
     network: Network = Network()
     drives: Annotated[dict[Name, DriveConfig], Meta(min_length=1)]

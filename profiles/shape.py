@@ -87,7 +87,7 @@ def expected(kind: inspect.Type) -> str:
     if isinstance(kind, inspect.UnionType):
         return " or ".join(expected(member) for member in kind.types)
     if isinstance(kind, inspect.LiteralType):
-        return "one of " + ", ".join(str(value) for value in sorted(kind.values, key=str))
+        return "one of " + ", ".join(str(value) for value in sorted(kind.values, key=_rank))
     if isinstance(kind, inspect.IntType | inspect.FloatType):
         return _NUMBERS[type(kind)] + _range(kind)
     if isinstance(kind, inspect.StrType):
@@ -99,9 +99,14 @@ def expected(kind: inspect.Type) -> str:
     return "nothing" if isinstance(kind, inspect.NoneType) else "a mapping"
 
 
+def _rank(value: str | int | None) -> tuple[int, str]:
+    """Numbers by size, texts by letters."""
+    return (value, "") if isinstance(value, int) else (0, str(value))
+
+
 def _range(kind: inspect.IntType | inspect.FloatType) -> str:
-    low = f"from {kind.ge:g}" if kind.ge is not None else f"greater than {kind.gt:g}" if kind.gt is not None else ""
-    high = f"to {kind.le:g}" if kind.le is not None else f"below {kind.lt:g}" if kind.lt is not None else ""
+    low = f"from {kind.ge:.12g}" if kind.ge is not None else f"greater than {kind.gt:g}" if kind.gt is not None else ""
+    high = f"to {kind.le:.12g}" if kind.le is not None else f"below {kind.lt:g}" if kind.lt is not None else ""
     joint = " and " if low and high and (kind.gt is not None or kind.lt is not None) else " "
     return f" {joint.join(part for part in (low, high) if part)}".rstrip()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import signal
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -54,7 +55,8 @@ def demo(
             f"the demo simulates its network, on {bus!r} it cannot", remedy="--bus simulated or --bus rs232"
         )
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
+        _make_folder(out)
+    _end_by_signals()
     with DemoView(every=100 if virtual_time else 10) as view:
 
         async def drive() -> list[FigureResult]:
@@ -65,6 +67,29 @@ def demo(
     if out is not None:
         _draw(results, robot.vehicle, out)
     return 0
+
+
+def _end_by_signals() -> None:
+    """The loop ends the demo in order on SIGINT, which shells ignore for background jobs; other signals become one."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _as_ctrl_c)
+
+
+def _as_ctrl_c(number: int, _: object) -> None:
+    signal.raise_signal(signal.SIGINT)
+
+
+def _make_folder(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(
+            f"--out {out} is no folder and cannot be made one: {error.strerror}",
+            value=str(out),
+            remedy="name a folder that this user may write to",
+        ) from error
 
 
 def _table(results: list[FigureResult]) -> Table:

@@ -36,6 +36,9 @@ SERIAL_SEND_TIMEOUT_S = 0.01
 OPTIONS: dict[str, dict[str, Any]] = {"slcan": {"timeout": 0.0}}
 """What interfaces need beside channel and bit rate: a serial port that does not wait for the next byte."""
 
+NO_KERNEL_CAN = (
+    "this kernel has no CAN: sudo modprobe can_raw, or another kernel; a serial adapter (slcan:DEVICE) needs none"
+)
 _GONE = {errno.ENETDOWN, errno.ENODEV, errno.ENXIO, errno.EIO, errno.EBADF}
 _ERROR_CLASS_BUS_OFF = 0x40  # linux/can/error.h
 
@@ -298,7 +301,8 @@ class PythonCanBus(Bus):
         LOGGER.info("%s is back", self.name)
 
     def _bus_off(self, error: Exception) -> BusOff:
-        return BusOff(f"{self.interface} interface {self.channel} is down or missing: {error}", remedy=self._remedy())
+        remedy = NO_KERNEL_CAN if _error_number(error) == errno.EAFNOSUPPORT else self._remedy()
+        return BusOff(f"{self.interface} interface {self.channel} is down or missing: {error}", remedy=remedy)
 
     def _remedy(self) -> str:
         if self.interface != "socketcan":

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import signal
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +14,7 @@ import msgspec
 import pytest
 
 from canhelm.errors import UsageError
+from daemon.cli.main import main
 from daemon.demo import FIGURES, Demo, FigureResult
 from daemon.runtime.clock import run_virtual
 from profiles.loader import load
@@ -107,3 +111,24 @@ async def test_the_demo_refuses_a_robot_that_it_cannot_drive() -> None:
     bare = msgspec.structs.replace(load("max2d").profile, vehicle=None)
     with pytest.raises(UsageError, match="paired steering"):
         Demo(bare, 0, None, lambda _: None)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+def test_a_signal_ends_the_demo_in_order_even_where_a_shell_has_ctrl_c_ignored(number: signal.Signals) -> None:
+    command = [sys.executable, "-m", "daemon", "demo"]
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        running = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert running.stderr is not None
+    assert "booting" in running.stderr.readline()
+    running.send_signal(number)
+    _, said = running.communicate(timeout=20)
+    assert (running.returncode, said.splitlines()[-1]) == (130, "canhelm: interrupted")
+
+
+def test_an_output_folder_that_cannot_be_is_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("")
+    assert main(["demo", "--virtual-time", "--out", str(tmp_path / "file")]) == 2
+    assert "is no folder and cannot be made one" in capsys.readouterr().err

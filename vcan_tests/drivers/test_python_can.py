@@ -253,6 +253,17 @@ async def test_a_missing_interface_comes_with_the_line_that_makes_it(
     assert remedy in str(refusal.value.remedy)
 
 
+async def test_a_kernel_without_can_is_not_helped_by_setting_up_the_interface(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unsupported(**_: object) -> can.BusABC:
+        raise OSError(errno.EAFNOSUPPORT, "Address family not supported by protocol")
+
+    monkeypatch.setattr(can, "Bus", unsupported)
+    with pytest.raises(BusOff, match="Address family not supported") as refusal:
+        await open_bus("socketcan:can0", BIT_RATE).open()
+    assert "modprobe can_raw" in str(refusal.value.remedy)
+    assert "ip link" not in str(refusal.value.remedy)
+
+
 async def test_an_interface_that_is_down_is_refused_at_opening(monkeypatch: pytest.MonkeyPatch) -> None:
     link = ScriptedLink()
     link.far.send(b"down")

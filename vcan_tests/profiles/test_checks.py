@@ -48,6 +48,14 @@ def test_parts_that_do_not_fit_are_a_mistake(mistakes: Mistakes, yaml: str, mist
     assert [found for found in mistakes(yaml) if f": {mistake}" in found]
 
 
+@pytest.mark.parametrize(
+    "yaml",
+    ["drives: ", "brakes: {rear: {output: 99}}", "encoders: {rear: {counts_per_turn: 0}}", "encoders: 5"],
+)
+def test_one_mistake_is_told_once_and_draws_no_others(mistakes: Mistakes, yaml: str) -> None:
+    assert len(mistakes(yaml)) == 1
+
+
 @pytest.mark.parametrize(("version", "remedy"), [(0, "write schema_version: 1"), (2, "install a newer canhelm")])
 def test_another_schema_version_is_a_mistake(tmp_path: Path, version: int, remedy: str) -> None:
     (tmp_path / "lab.yaml").write_text(f"extends: max2d\nschema_version: {version}\n")

@@ -202,3 +202,15 @@ def test_any_bytes_load_or_are_a_configuration_error(tmp_path: Path, content: by
     path.write_bytes(content)
     with pytest.raises(ConfigError):
         load(path)
+
+
+@pytest.mark.parametrize(("line", "name"), [("", "lab7"), ("name: ours\n", "ours")])
+def test_a_robot_is_called_as_it_says_or_else_like_its_file(tmp_path: Path, line: str, name: str) -> None:
+    (tmp_path / "lab7.yaml").write_text(f"extends: max2d\n{line}")
+    assert load(tmp_path / "lab7.yaml").profile.name == name
+
+
+def test_a_file_whose_name_is_none_for_a_robot_is_told(tmp_path: Path) -> None:
+    (tmp_path / "7 up.yaml").write_text("extends: max2d\n")
+    with pytest.raises(ConfigError, match=r"7 up\.yaml:1: name: is '7 up'; write a text that matches"):
+        load(tmp_path / "7 up.yaml")

@@ -35,7 +35,7 @@ from vcan_tests.profiles.conftest import Mistakes, Robot
             "vehicle: {max_heading_deg: 90}",
             "vehicle.max_heading_deg: is 90; write a number greater than 0 and below 90",
         ),
-        ("network: {bit_rate: 123456}", "network.bit_rate: is 123456; write one of 1000000, 125000, "),
+        ("network: {bit_rate: 123456}", "network.bit_rate: is 123456; write one of 20000, 50000, 125000, "),
         ("encoders: {rear: {total_counts: few}}", "encoders.rear.total_counts: is 'few'; write a whole number from 1 "),
         ("description: 5", "description: is 5; write a text"),
         ("limits: {sped_m_s: 1}", "limits.sped_m_s: is an unknown key; did you mean speed_m_s?"),
