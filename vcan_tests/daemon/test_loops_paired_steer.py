@@ -298,7 +298,7 @@ def test_after_a_failure_the_robot_ramps_to_rest_and_takes_a_new_target(
 
 def test_a_target_beyond_the_limits_moves_nothing(law: PairedSteerLaw, robot: PairedRobot) -> None:
     steps = drive(law, robot, parallel_target(math.radians(95), 0.5, 1))
-    assert "beyond the limit of 85 deg" in steps[-1].record.failure
+    assert "beyond the limit to each side" in steps[-1].record.failure
     assert steps[-1].command == Command(STANDING, (False, False))
 
 
