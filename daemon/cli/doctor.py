@@ -184,6 +184,7 @@ def status_findings(status: Mapping[str, Any]) -> Iterator[Finding]:
     api = status.get("api") or {}
     yield _cycle_finding(status.get("cycle") or {}, api.get("pid"))
     yield _bus_finding(status.get("bus") or {})
+    yield from _line_findings(status.get("bus") or {}, status.get("cycle") or {})
     yield from _recording_findings(status.get("recording") or {})
     defects = api.get("internal_errors", 0)
     if defects:
@@ -234,3 +235,23 @@ def _bus_finding(bus: Mapping[str, Any]) -> Finding:
         told = ", ".join(f"{key} {value}" for key, value in lost.items())
         return Finding("bus", "problem", told, "lower the load, or look for a node that does not acknowledge")
     return Finding("bus", "ok", f"load {float(bus.get('load') or 0.0):.1%}, nothing dropped")
+
+
+def _line_findings(bus: Mapping[str, Any], cycle: Mapping[str, Any]) -> Iterator[Finding]:
+    """What a serial line gives, where there is one, and what a cable that is pulled would mean."""
+    if "planned_hz" not in bus:
+        return
+    if bus.get("line_down"):
+        yield Finding(
+            "serial line", "problem", str(bus["line_down"]), "plug the adapter in; it is opened again by itself"
+        )
+        return
+    at = ", ".join(f"{hz} at {baud} baud" for baud, hz in bus["planned_hz_at_baud"].items())
+    rate = f"{cycle.get('achieved_hz')} cycles a second at {bus['baud']} baud, planned {bus['planned_hz']} ({at})"
+    if bus.get("silent_nodes"):
+        nodes = ", ".join(map(str, bus["silent_nodes"]))
+        yield Finding("serial line", "problem", f"{rate}; silent nodes: {nodes}", "switch their power on")
+    else:
+        yield Finding("serial line", "ok", f"{rate}; resynchronised {bus['resyncs']} times")
+    stop = f"at full speed the wheels rest {bus['silent_line_stop_s']} s and {bus['silent_line_stop_m']} m after it"
+    yield Finding("pulled cable", "note", stop, f"the speed limit is {bus['speed_limit_m_s']} m/s; see docs/rs232.md")

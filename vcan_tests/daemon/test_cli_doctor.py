@@ -117,3 +117,27 @@ def test_the_doctor_works_without_a_daemon(
 
 def test_a_socket_on_which_nobody_answers_is_a_problem(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["doctor", "--socket", "/nonexistent/robot.sock"]) == 1
+
+
+LINE = {
+    "baud": 115200, "planned_hz": 16.1, "planned_hz_at_baud": {"115200": 16.1, "38400": 7.5}, "speed_limit_m_s": 0.9,
+    "silent_line_stop_s": 1.4, "silent_line_stop_m": 1.5, "resyncs": 0, "silent_nodes": [], "line_down": None,
+}  # fmt: skip
+
+
+def test_a_serial_line_is_told_with_its_rates_and_with_what_a_pulled_cable_means() -> None:
+    found = findings(bus=LINE, cycle={"achieved_hz": 19.5})
+    assert found["serial line"].verdict == "ok"
+    assert "19.5 cycles a second" in found["serial line"].finding
+    assert "7.5 at 38400 baud" in found["serial line"].finding
+    assert "1.4 s and 1.5 m" in found["pulled cable"].finding
+
+
+def test_a_node_that_is_silent_on_a_serial_line_is_a_problem() -> None:
+    found = findings(bus={**LINE, "silent_nodes": [3]}, cycle={"achieved_hz": 10.0})
+    assert (found["serial line"].verdict, "silent nodes: 3" in found["serial line"].finding) == ("problem", True)
+
+
+def test_a_serial_line_that_is_gone_is_a_problem() -> None:
+    found = findings(bus={**LINE, "line_down": "/dev/ttyUSB0 is gone"}, cycle={})
+    assert (found["serial line"].verdict, found["serial line"].finding) == ("problem", "/dev/ttyUSB0 is gone")
