@@ -46,6 +46,8 @@ class Network(Part, frozen=True, kw_only=True):
     """Time one attempt to configure a node may take before it is started over."""
     sdo_timeout_s: Positive = 0.25
     """Time a node has to answer one SDO request."""
+    patience_s: Annotated[float, Meta(ge=0)] = 0.0
+    """Time for which a request to a dead node may keep the wire from the others; no node is called silent sooner."""
     synchronous: bool = True
     """PDOs go with SYNC; without it targets count at once and readings come on request (as over the RS-232 gateway)."""
     gateway: str | None = None

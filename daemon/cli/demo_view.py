@@ -66,7 +66,8 @@ class DemoView:
         line = app.bus.details()
         if line:
             busy, ours = line["line_utilisation"], line["own_idle_share"]
-            caption += f"\nserial line: {app.cycle.counters.achieved_hz:.1f} cycles/s, busy {busy:.0%}, idle on our side {ours:.1%}"
+            caption += f"\nserial line: {app.cycle.counters.achieved_hz:.1f} cycles/s, busy {busy:.0%}, "
+            caption += f"idle on our side {ours:.1%}"
         table = Table(title=f"{supervisor.state.value} {phase}", caption=caption, min_width=70)
         for column in ("wheel", "heading", "commanded", "measured", "current"):
             table.add_column(column, justify="left" if column == "wheel" else "right")

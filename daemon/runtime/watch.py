@@ -10,7 +10,10 @@ from drivers.contract import Device, NodeState
 from drivers.devices import Devices
 
 SILENT_CYCLES = 5
-"""Cycles without a reading after which a node counts as silent while something moves."""
+"""Control cycles without a reading after which a node counts as silent while something moves.
+
+Cycles count, not time: while the daemon itself stands still nobody asks. A pause that is too long for the drives is
+theirs to notice, by life guarding."""
 LATE_CYCLES = 2
 """Cycles between two looks from which on the daemon itself counts as late."""
 
@@ -21,13 +24,15 @@ class DeviceWatch:
     Args:
         devices: all devices.
         period_s: the control cycle's period.
+        patience_s: see ``Network.patience_s``.
     """
 
-    def __init__(self, devices: Devices, period_s: float) -> None:
+    def __init__(self, devices: Devices, period_s: float, patience_s: float = 0.0) -> None:
         self._devices = tuple(devices.by_node.values())
         self._by_node = devices.by_node
         self._period_s = period_s
-        self._silent_s = SILENT_CYCLES * period_s
+        self._silent_cycles = max(SILENT_CYCLES, math.ceil(patience_s / period_s))
+        self._unread: dict[int, tuple[float, int]] = {}
         self._looked_s: float | None = None
         self._stall_end_s = -math.inf
         self._stall_s = 0.0
@@ -47,9 +52,16 @@ class DeviceWatch:
             fault = device.fault
             if fault is not None and (powered or fault.code != 0):
                 return DeviceFault(fault.message, node=fault.node, value=fault.code or None, remedy=fault.remedy)
-            if powered and device.node_state is NodeState.READY and now_s - device.reading_time_s > self._silent_s:
+            if self._cycles_unread(device) > self._silent_cycles and powered and device.node_state is NodeState.READY:
                 return self._silence(device, f"{device.who} is silent", now_s, "check its power and the CAN cable")
         return None
+
+    def _cycles_unread(self, device: Device) -> int:
+        """Looks since the device's last reading."""
+        reading_s, cycles = self._unread.get(device.node, (-math.inf, 0))
+        cycles = cycles + 1 if device.reading_time_s == reading_s else 0
+        self._unread[device.node] = (device.reading_time_s, cycles)
+        return cycles
 
     def lost(self, event: NodeEvent) -> DeviceFault | None:
         """The fault that an event about a node means for a vehicle that is powered, or None."""

@@ -28,6 +28,7 @@ class Guard:
         guard_time_s: time between two requests.
         request: sends a remote frame with the COB-ID it is given.
         on_lost: called once with the time since the last sign of life.
+        patience_s: the node is not given up sooner than this after a request.
     """
 
     def __init__(
@@ -36,11 +37,13 @@ class Guard:
         guard_time_s: float,
         request: Callable[[int], None],
         on_lost: Callable[[float], None],
+        patience_s: float = 0.0,
     ) -> None:
         self.node = node
         self.guard_time_s = guard_time_s
         self._request = request
         self._on_lost = on_lost
+        self._lost_s = max(LOST_AFTER * guard_time_s, patience_s)
         self._armed = False
         self._called_s = 0.0
         self._next_s = 0.0
@@ -74,7 +77,7 @@ class Guard:
         if asked_s is None:
             if now_s >= self._next_s - EARLY * guard_time_s:
                 self._ask(now_s)
-        elif now_s >= asked_s + LOST_AFTER * guard_time_s:
+        elif now_s >= asked_s + self._lost_s:
             self._armed = False
             self._on_lost(now_s - self._alive_s)
         elif not self._repeated and now_s >= asked_s + REPEAT_AFTER * guard_time_s:

@@ -146,7 +146,8 @@ class Master:
 
     def guard(self, node: int, on_lost: Callable[[float], None]) -> Guard:
         """The guard of a node, not armed yet; ``on_lost`` gets the time since its last sign of life."""
-        guard = Guard(node, self.network.guard_time_ms / 1e3, self._send_guard_request, on_lost)
+        guard_time_s, patience_s = self.network.guard_time_ms / 1e3, self.network.patience_s
+        guard = Guard(node, guard_time_s, self._send_guard_request, on_lost, patience_s)
         self._guards[node] = guard
         return guard
 

@@ -33,6 +33,8 @@ SPARE = 1.15
 """Share of the line left for guarding, SDO of people, and repetitions."""
 HEADING_TOLERANCE_DEG = 0.5
 """A pair that turns at the slower rate is not stopped more exactly than this."""
+PATIENCE_S = 0.6
+"""A little more than a gateway waits for a node that is dead (assumed)."""
 LIFE_TIME_FACTOR = 2
 """A broken conversation costs the line half a second; a vehicle that moves is then stopped anyway."""
 REACTION_CYCLES_CAN = 2
@@ -125,6 +127,7 @@ def serial_profile(profile: Profile, baud: int) -> Profile:
             cycle_hz=round(line.cycle_hz, 3),
             guard_time_ms=round(1e3 * line.guard_time_s),
             life_time_factor=LIFE_TIME_FACTOR,
+            patience_s=PATIENCE_S,
             boot_deadline_s=30.0,
             sdo_timeout_s=2.5,
             synchronous=False,

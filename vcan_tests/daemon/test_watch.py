@@ -40,9 +40,20 @@ def test_a_silent_node_is_to_be_looked_for_on_the_cable(devices: Devices) -> Non
     assert "node 1 (rear_right) is silent; stop commanded 60 ms after its last reading (check its power" in told
 
 
+def test_a_pause_of_the_daemon_alone_makes_no_node_silent(devices: Devices) -> None:
+    assert watching(devices, 1.0, 1.25, 1.26) == "None"
+
+
+def test_nobody_is_silent_while_a_dead_node_may_keep_the_wire(devices: Devices) -> None:
+    watch = DeviceWatch(devices, PERIOD_S, patience_s=0.1)
+    looks = [watch.look(1.0 + PERIOD_S * number, powered=True) for number in range(13)]
+    assert looks[:11] == [None] * 11
+    assert looks[11] is not None
+
+
 def test_a_daemon_that_was_late_itself_says_so(devices: Devices) -> None:
-    told = watching(devices, 1.0, 1.08)
-    assert "the daemon itself was 70 ms late meanwhile (look for what loads this machine" in told
+    told = watching(devices, 1.0, *(1.07 + PERIOD_S * number for number in range(7)))
+    assert "the daemon itself was 60 ms late meanwhile (look for what loads this machine" in told
 
 
 def test_a_lateness_before_the_last_reading_is_no_excuse(devices: Devices) -> None:
