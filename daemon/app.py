@@ -87,7 +87,9 @@ class App:
         self.vehicle = make_vehicle(profile, self.devices)
         period_s = 1.0 / profile.network.cycle_hz
         self.supervisor = Supervisor(self.master, self.devices, self.vehicle, period_s)
-        self.cycle = Cycle(self.master, self.devices, period_s, self.supervisor.step, wire.pace, wire.reading_share)
+        self.cycle = Cycle(
+            self.master, self.devices, period_s, self.supervisor.step, wire.pace, wire.reading_share, wire.good_within
+        )
         commands = Commands(self.supervisor, self._switch_power if self.network else None)
         self.service = Service(profile.name, self.supervisor, commands, self.bus, self.cycle)
         self.server = self._serve(socket) if socket else None

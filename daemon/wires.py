@@ -40,6 +40,7 @@ class Wire:
         cable: the simulated serial cable, where there is one.
         pace: makes what ticks the control cycle, from period and callback.
         reading_share: share of a cycle that its readings may take.
+        good_within: periods within which a cycle has to end to be a good one; a line may be slower than planned.
     """
 
     bus: Bus
@@ -49,6 +50,7 @@ class Wire:
     cable: SerialCable | None = None
     pace: Callable[[float, Callable[[], None]], Pace] = Ticker
     reading_share: float = 0.5
+    good_within: float = 1.0
 
 
 def make_wire(spec: str, profile: Profile, seed: int) -> Wire:
@@ -101,7 +103,7 @@ def _serial_wire(
     encoders = {encoder.node: ENCODER_OBJECTS for encoder in profile.encoders.values()}
     gateway = profile.drives[gateway_of(profile)].node
     bus = SerialGatewayBus(name, connect, baud, profile.network.bit_rate, gateway, encoders, facts(profile, baud))
-    return Wire(bus, shrunk, network, medium, cable, partial(LinePace, bus), reading_share=0.9)
+    return Wire(bus, shrunk, network, medium, cable, partial(LinePace, bus), 0.9, 3.0)
 
 
 def _open_device(device: str, baud: int, on_lost: OnLost) -> Transport:

@@ -48,7 +48,7 @@ class CycleCounters:
 class Cycle:
     """Runs ``step(now_s, dt_s)`` once per period, as soon as every node's reading of the cycle is there.
 
-    A good cycle, one whose step ended within its period, sends the guard requests that are due; so a daemon that hangs
+    A good cycle, one whose step ended in time, sends the guard requests that are due; so a daemon that hangs
     stops guarding and its drives stop by themselves.
 
     Args:
@@ -59,6 +59,7 @@ class Cycle:
         pace: makes what ticks, from period and callback.
         reading_share: share of the period that the readings may take before the step runs without those that are
             missing.
+        good_within: periods within which a cycle has to end to be a good one.
     """
 
     def __init__(
@@ -69,6 +70,7 @@ class Cycle:
         step: Callable[[float, float], None],
         pace: Callable[[float, Callable[[], None]], Pace] = Ticker,
         reading_share: float = 0.5,
+        good_within: float = 1.0,
     ) -> None:
         self.counters = CycleCounters()
         self.period_s = period_s
@@ -76,6 +78,7 @@ class Cycle:
         self._devices = devices
         self._step = step
         self._reading_s = reading_share * period_s
+        self._good_s = good_within * period_s
         self._ticker = pace(period_s, self._tick)
         self._missing: set[int] = set()
         self._waiting = False
@@ -137,7 +140,7 @@ class Cycle:
         end = self._loop.time()
         lateness = self._ticker.max_lateness_s
         counters.max_lateness_s = max(counters.max_lateness_s, lateness)
-        if end <= self._tick_s + self.period_s:
+        if end <= self._tick_s + self._good_s:
             self._master.guard_due(end)
         else:
             counters.late_cycles += 1

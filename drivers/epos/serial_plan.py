@@ -125,7 +125,7 @@ def serial_profile(profile: Profile, baud: int) -> Profile:
         network=replace(
             network,
             cycle_hz=round(line.cycle_hz, 3),
-            guard_time_ms=round(1e3 * line.guard_time_s),
+            guard_time_ms=max(network.guard_time_ms, round(1e3 * line.guard_time_s)),
             life_time_factor=LIFE_TIME_FACTOR,
             patience_s=PATIENCE_S,
             boot_deadline_s=30.0,

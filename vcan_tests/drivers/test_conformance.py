@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 import canopen
 import pytest
+from canopen.sdo import SdoClient
 
 from canhelm.errors import Aborted
 from drivers.bus.python_can import PythonCanBus, open_bus
@@ -34,6 +35,13 @@ from profiles.schema import EncoderConfig, Network
 from vcan_tests.peer import peer_dictionary
 
 pytestmark = [pytest.mark.real_time, pytest.mark.timeout(30)]
+
+
+@pytest.fixture(autouse=True)
+def patient_peer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The peer waits 300 ms for an answer; a loaded machine may pause for longer."""
+    monkeypatch.setattr(SdoClient, "RESPONSE_TIMEOUT", 3.0)
+
 
 EPOS, ENCODER, STORE = 1, 5, 9
 LIMIT_S = 5.0

@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator, Callable
 import pytest
 
 from canhelm.errors import BusOff, UsageError
+from drivers.epos.serial_conversation import SerialTiming
 from drivers.epos.serial_frames import make_read_object, make_write_object
 from drivers.epos.serial_line import SerialLine
 from drivers.epos.serial_tty import BAUD_RATES, SerialTty
@@ -16,6 +17,10 @@ from vcan_tests.drivers.serial_bench import Drive
 
 STATUSWORD = make_read_object(1, 0x6041, 0)
 CONTROLWORD = make_write_object(1, 0x6040, 0, b"\x06\x00")
+
+
+PATIENT = SerialTiming(acknowledge_s=3.0, answer_s=3.0, byte_s=3.0)
+"""Outlives the pauses of a loaded machine."""
 
 
 class Pty:
@@ -82,7 +87,7 @@ async def opened(pty: Pty) -> AsyncIterator[Callable[[], SerialTty]]:
 @pytest.mark.real_time
 async def test_reads_and_writes_go_through_a_terminal(pty: Pty, opened: Callable[[], SerialTty]) -> None:
     drive = pty.join(Drive())
-    line = SerialLine(opened(), 115200)
+    line = SerialLine(opened(), 115200, timing=PATIENT)
     for _ in range(50):
         await line.request(CONTROLWORD)
         assert (await line.request(STATUSWORD)).data == drive.value(1, 0x6041, 0)
@@ -138,12 +143,18 @@ async def test_the_device_is_raw_at_its_rate(pty: Pty, opened: Callable[[], Seri
 
 @pytest.mark.real_time
 async def test_all_bytes_pass_unchanged_both_ways(pty: Pty, opened: Callable[[], SerialTty]) -> None:
-    heard = bytearray()
+    heard, complete = bytearray(), asyncio.Event()
+
+    def hear(data: bytes, _: float) -> None:
+        heard.extend(data)
+        if len(heard) >= 256:
+            complete.set()
+
     serial = opened()
-    serial.host = lambda data, _: heard.extend(data)
+    serial.host = hear
     serial.write(bytes(range(256)))
     pty.say(bytes(range(256)))
-    await asyncio.sleep(0.01)
+    await asyncio.wait_for(complete.wait(), 5.0)
     assert pty.hear() == bytes(range(256)) == heard
 
 
