@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 import canopen
 import pytest
-from canopen.sdo import SdoClient
+from canopen.sdo.client import SdoClient
 
 from canhelm.errors import Aborted
 from drivers.bus.python_can import PythonCanBus, open_bus
