@@ -251,7 +251,7 @@ class Demo:
         if icr is not None:
             return {**commanded, "radius_m": round(math.hypot(*icr), 4)}
         distance, angle = figure.speed_m_s * figure.duration_s, math.radians(figure.rear_deg)
-        end = {"end_x_m": round(distance * math.cos(angle), 4), "end_y_m": round(distance * math.sin(angle), 4)}
+        end = {"end_x_m": _rounded(distance * math.cos(angle)), "end_y_m": _rounded(distance * math.sin(angle))}
         return {**commanded, **end}
 
     def _achieved(self, figure: Figure, track: Track, result: dict[str, Any], duration_s: float) -> dict[str, Any]:
@@ -261,15 +261,20 @@ class Demo:
         slip_ratio = max(abs(ratio) for row in rows for ratio in track.slip_ratio[row])
         slip_angle = max(abs(angle) for row in rows for angle in track.slip_angle_rad[row])
         return {
-            "end_x_m": round(x, 4),
-            "end_y_m": round(y, 4),
-            "heading_deg": round(math.degrees(yaw), 3),
+            "end_x_m": _rounded(x),
+            "end_y_m": _rounded(y),
+            "heading_deg": _rounded(math.degrees(yaw), 3),
             "radius_m": None if radius is None else round(radius, 4),
             "steering_error_deg": round(result["steering_error_deg"], 4),
             "max_slip_ratio": round(slip_ratio, 4),
             "max_slip_angle_deg": round(math.degrees(slip_angle), 3),
             "duration_s": round(duration_s, 3),
         }
+
+
+def _rounded(value: float, digits: int = 4) -> float:
+    """Rounded, without a sign on zero."""
+    return round(value, digits) + 0.0
 
 
 def _line_words(line: dict[str, Any]) -> str:
