@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from canhelm import __version__, errors, protocol
 from canhelm.errors import CanhelmError, Refused, UsageError
-from daemon.api.methods import METHODS, NOTIFICATIONS, Method, validate
+from daemon.api.methods import METHODS, NOTIFICATIONS
+from daemon.api.parameters import Method, validate
 from daemon.api.peers import Peer
 
 if TYPE_CHECKING:

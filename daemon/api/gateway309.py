@@ -17,7 +17,7 @@ from canhelm.errors import ConfigError
 from daemon.api.gateway309_answers import ErrorNumber, make_error
 from daemon.api.gateway309_session import Session
 from daemon.api.gateway309_text import MAX_LINE_BYTES
-from daemon.api.methods import Role
+from daemon.api.parameters import Role
 from daemon.api.peers import ADMINS, USERS, Peer
 from daemon.api.server import open_listener, remove_socket
 from daemon.runtime.supervisor import Supervisor

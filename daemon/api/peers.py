@@ -14,7 +14,7 @@ import struct
 from dataclasses import dataclass
 
 from canhelm.errors import PermissionRefused
-from daemon.api.methods import Method, Role
+from daemon.api.parameters import Method, Role
 
 USERS = "canhelm"
 ADMINS = "canhelm-admin"

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canhelm.errors import UsageError
-from daemon.api.methods import METHODS, validate
+from daemon.api.methods import METHODS
+from daemon.api.parameters import validate
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(),

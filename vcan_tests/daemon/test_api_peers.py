@@ -9,7 +9,8 @@ import pytest
 
 from canhelm.errors import PermissionRefused
 from daemon.api import peers
-from daemon.api.methods import METHODS, Role
+from daemon.api.methods import METHODS
+from daemon.api.parameters import Role
 from daemon.api.peers import Peer, role_of
 
 STRANGER = 54_321

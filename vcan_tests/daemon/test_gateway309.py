@@ -260,7 +260,7 @@ async def test_nobody_writes_unless_the_daemon_was_told_so(app: App, tmp_path: P
 async def test_only_who_may_configure_writes(
     connect: Connect, monkeypatch: pytest.MonkeyPatch, role: str, line: bytes
 ) -> None:
-    from daemon.api.methods import Role
+    from daemon.api.parameters import Role
 
     monkeypatch.setattr(Peer, "of", lambda connection: Peer(1, Role(role)))
     assert (await (await connect()).ask(line)).startswith(b"[1] ERROR:100 #this user may only read")
