@@ -116,26 +116,38 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     assert not bench.socket.exists()
 
 
-def test_a_motor_is_enabled_turned_and_disabled_from_the_shell(bench: Bench) -> None:
-    assert bench.canhelm("motor", "enable", "1").returncode == 0
-    turned = bench.canhelm("motor", "velocity", "1", "-250", "--duration", "0.5")
+@pytest.fixture
+def rested(bench: Bench) -> Bench:
+    """The bench, at rest and without a fault that an earlier test may have left."""
+    if bench.status()["state"] != "idle":
+        bench.client.call("stop")
+        bench.client.call("reset")
+        for node in (1, 2, 3, 4):
+            bench.client.call("motor.disable", node=node)
+    bench.wait_for(lambda status: status["state"] == "idle")
+    return bench
+
+
+def test_a_motor_is_enabled_turned_and_disabled_from_the_shell(rested: Bench) -> None:
+    assert rested.canhelm("motor", "enable", "1").returncode == 0
+    turned = rested.canhelm("motor", "velocity", "1", "-250", "--duration", "0.5")
     assert turned.returncode == 0
     assert json.loads(turned.stdout)["wheel_travel_m"] > 0.03
-    assert bench.canhelm("motor", "disable", "1").returncode == 0
+    assert rested.canhelm("motor", "disable", "1").returncode == 0
 
 
-def test_status_piped_is_one_json_object(bench: Bench) -> None:
-    status = json.loads(bench.canhelm("status").stdout)
+def test_status_piped_is_one_json_object(rested: Bench) -> None:
+    status = json.loads(rested.canhelm("status").stdout)
     assert status["state"] == "idle"
     assert len(status["nodes"]) == 6
 
 
-def test_a_brake_and_a_pair_are_moved_from_the_shell(bench: Bench) -> None:
-    assert bench.canhelm("brake", "release", "front").returncode == 0
-    assert bench.canhelm("brake", "engage", "front").returncode == 0
-    steered = json.loads(bench.canhelm("steer", "front", "20").stdout)
+def test_a_brake_and_a_pair_are_moved_from_the_shell(rested: Bench) -> None:
+    assert rested.canhelm("brake", "release", "front").returncode == 0
+    assert rested.canhelm("brake", "engage", "front").returncode == 0
+    steered = json.loads(rested.canhelm("steer", "front", "20").stdout)
     assert steered["steering_error_deg"] <= 0.2
-    assert bench.canhelm("steer", "front", "0").returncode == 0
+    assert rested.canhelm("steer", "front", "0").returncode == 0
 
 
 @pytest.mark.parametrize(
@@ -148,73 +160,73 @@ def test_a_brake_and_a_pair_are_moved_from_the_shell(bench: Bench) -> None:
         (("drive", "parallel", "--angle", "0", "--speed", "9", "--duration", "1"), 1),
     ],
 )
-def test_refused_commands_have_their_exit_codes(bench: Bench, arguments: tuple[str, ...], code: int) -> None:
-    refused = bench.canhelm(*arguments)
+def test_refused_commands_have_their_exit_codes(rested: Bench, arguments: tuple[str, ...], code: int) -> None:
+    refused = rested.canhelm(*arguments)
     assert refused.returncode == code
     assert refused.stderr.startswith("canhelm: ")
     assert "Traceback" not in refused.stderr
 
 
-def test_ctrl_c_in_the_middle_of_a_drive_stops_the_robot(bench: Bench) -> None:
-    driving = bench.drive()
+def test_ctrl_c_in_the_middle_of_a_drive_stops_the_robot(rested: Bench) -> None:
+    driving = rested.drive()
     driving.send_signal(signal.SIGINT)
     _, said = driving.communicate(timeout=TIMEOUT_S)
     assert driving.returncode == 130
     assert "stopped" in said
-    assert at_rest(bench.status())
+    assert at_rest(rested.status())
 
 
-def test_a_suspended_command_loses_its_lease_and_the_robot_stops(bench: Bench) -> None:
-    driving = bench.drive()
+def test_a_suspended_command_loses_its_lease_and_the_robot_stops(rested: Bench) -> None:
+    driving = rested.drive()
     driving.send_signal(signal.SIGSTOP)
-    bench.wait_for(at_rest)
+    rested.wait_for(at_rest)
     driving.send_signal(signal.SIGCONT)
     _, said = driving.communicate(timeout=TIMEOUT_S)
     assert driving.returncode == 1
     assert "lease" in said
 
 
-def test_a_killed_command_has_its_motion_stopped(bench: Bench) -> None:
-    driving = bench.drive()
+def test_a_killed_command_has_its_motion_stopped(rested: Bench) -> None:
+    driving = rested.drive()
     driving.kill()
     driving.communicate(timeout=TIMEOUT_S)
-    bench.wait_for(at_rest)
+    rested.wait_for(at_rest)
 
 
-def test_stop_works_from_another_shell_without_a_lease(bench: Bench) -> None:
-    driving = bench.drive()
-    assert bench.canhelm("stop").returncode == 0
-    assert at_rest(bench.status())
+def test_stop_works_from_another_shell_without_a_lease(rested: Bench) -> None:
+    driving = rested.drive()
+    assert rested.canhelm("stop").returncode == 0
+    assert at_rest(rested.status())
     driving.communicate(timeout=TIMEOUT_S)
     assert driving.returncode == 1
 
 
-def test_the_emergency_stop_is_latched_between_shells(bench: Bench) -> None:
-    assert bench.canhelm("estop").returncode == 0
-    assert bench.canhelm("steer", "front", "3").returncode == 6
-    bench.wait_for(at_rest)
-    assert bench.canhelm("reset").returncode == 0
-    assert bench.canhelm("steer", "front", "0").returncode == 0
+def test_the_emergency_stop_is_latched_between_shells(rested: Bench) -> None:
+    assert rested.canhelm("estop").returncode == 0
+    assert rested.canhelm("steer", "front", "3").returncode == 6
+    rested.wait_for(at_rest)
+    assert rested.canhelm("reset").returncode == 0
+    assert rested.canhelm("steer", "front", "0").returncode == 0
 
 
-def test_a_drive_that_loses_power_stops_the_robot_and_one_reset_recovers(bench: Bench) -> None:
-    driving = bench.drive()
-    assert bench.canhelm("sim", "power", "3", "off").returncode == 0
-    bench.wait_for(lambda status: status["state"] == "fault" and at_rest(status))
-    assert bench.canhelm("sim", "power", "3", "on").returncode == 0
+def test_a_drive_that_loses_power_stops_the_robot_and_one_reset_recovers(rested: Bench) -> None:
+    driving = rested.drive()
+    assert rested.canhelm("sim", "power", "3", "off").returncode == 0
+    rested.wait_for(lambda status: status["state"] == "fault" and at_rest(status))
+    assert rested.canhelm("sim", "power", "3", "on").returncode == 0
     _, said = driving.communicate(timeout=TIMEOUT_S)
     assert driving.returncode == 1
     assert "front_left" in said
-    bench.wait_for(lambda status: all(node["node_state"] == "ready" for node in status["nodes"]))
-    assert json.loads(bench.canhelm("reset").stdout)["state"] == "idle"
-    again = bench.canhelm("drive", "parallel", "--angle", "0", "--speed", "0.3", "--duration", "0.5")
+    rested.wait_for(lambda status: all(node["node_state"] == "ready" for node in status["nodes"]))
+    assert json.loads(rested.canhelm("reset").stdout)["state"] == "idle"
+    again = rested.canhelm("drive", "parallel", "--angle", "0", "--speed", "0.3", "--duration", "0.5")
     assert again.returncode == 0
 
 
-def test_the_example_program_drives_its_figure(bench: Bench) -> None:
+def test_the_example_program_drives_its_figure(rested: Bench) -> None:
     example = Path(__file__).parents[2] / "examples" / "rhombus.py"
     program = subprocess.run(
-        [sys.executable, str(example)], capture_output=True, text=True, timeout=60, env=bench.environment()
+        [sys.executable, str(example)], capture_output=True, text=True, timeout=60, env=rested.environment()
     )
     assert program.returncode == 0, program.stderr
     assert len(program.stdout.splitlines()) == 4
