@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Coroutine
 from typing import Any
 
@@ -63,6 +64,7 @@ class Stopping:
         self._log = log
         self._drop_targets = drop_targets
         self._latched = 0
+        self._cause_s = 0.0
         self._halting = 0
 
     @property
@@ -88,9 +90,11 @@ class Stopping:
 
     @property
     def _cause_is_gone(self) -> bool:
-        """Whether the node that was at fault is there again and has no fault any more."""
+        """Whether the node that was at fault has been read again since and has no fault any more."""
         device = self._devices.by_node.get(self.cause.node or 0) if self.cause else None
-        return device is not None and device.node_state is NodeState.READY and device.fault is None
+        if device is None or device.node_state is not NodeState.READY or device.fault is not None:
+            return False
+        return device.reading_time_s > self._cause_s
 
     def require_none(self) -> None:
         """Raise EmergencyStop or NotReady while the vehicle is stopped, or about to be."""
@@ -136,6 +140,7 @@ class Stopping:
         self._latched += 1
         if not self.latched:
             self.cause = error
+            self._cause_s = asyncio.get_running_loop().time()
         self._halt(error)
         if not self._log.told(error.message):
             source = f"node {error.node}" if error.node else "supervisor"

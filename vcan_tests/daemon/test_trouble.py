@@ -36,6 +36,7 @@ async def test_a_drive_switched_off_and_on_stops_the_vehicle_and_drives_again_af
         robot.network.power_off(3)
         detected = await robot.until(lambda: robot.state == "fault")
         assert detected < TWO_GUARDING_PERIODS_S
+        assert "a fault that is gone" not in robot.app.service.status()["message"]
         await robot.until(lambda: robot.speed_m_s < 0.01, 3.0)
         robot.network.power_on(3)
         with pytest.raises(DeviceFault, match="front_left"):
