@@ -1,0 +1,37 @@
+"""``python -m vcan_tests.kernel [--systemd] [--timeout S] -- CMD ARG...``: runs a command in a guest with a CAN bus."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from vcan_tests.kernel.guest import NO_STATUS, TIMED_OUT, exchange_folder, run_in_guest
+from vcan_tests.kernel.tools import MissingTool
+
+
+def main() -> int:
+    """The command's own exit status; 124 when it was ended by the time-out, 125 when there was no guest to tell."""
+    parser = argparse.ArgumentParser(prog="python -m vcan_tests.kernel", description=__doc__)
+    parser.add_argument("--systemd", action="store_true", help="boot a real systemd; writing goes into a RAM disk")
+    parser.add_argument("--timeout", type=float, metavar="S", help="end the guest after so many seconds")
+    parser.add_argument("--env", action="append", default=[], metavar="K=V", help="a variable for the command")
+    parser.add_argument("command", nargs="+", metavar="CMD ARG...")
+    asked = parser.parse_args()
+    environment = dict(pair.split("=", 1) for pair in asked.env)
+    try:
+        with exchange_folder() as exchange:
+            outcome = run_in_guest(
+                asked.command, exchange, systemd=asked.systemd, timeout_s=asked.timeout, environment=environment
+            )
+    except MissingTool as error:
+        print(f"no guest: {error}", file=sys.stderr)
+        return NO_STATUS
+    if outcome.status == TIMED_OUT:
+        print(f"the guest was ended after {asked.timeout:g} s", file=sys.stderr)
+    if outcome.status == NO_STATUS:
+        print("the guest died before its command ended", file=sys.stderr)
+    return outcome.status
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,98 @@
+"""Where the user-mode kernel comes from: Debian's package ``user-mode-linux``, unpacked into a cache, not installed."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import tempfile
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+from vcan_tests.kernel.tools import MissingTool
+
+PACKAGE = "user-mode-linux"
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """An unpacked user-mode kernel: the program that it is, the folder of its modules, a library to preload if any."""
+
+    program: Path
+    modules: Path
+    preload: Path | None
+
+
+def cache() -> Path:
+    """The folder for what is worth keeping between runs (XDG Base Directory Specification, XDG_CACHE_HOME)."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "canhelm"
+
+
+def fetch_kernel() -> Kernel:
+    """The kernel of the cache; the first call downloads it (40 MB) with apt, which any user may do.
+
+    Raises:
+        MissingTool: it can't be had here.
+    """
+    root = cache() / PACKAGE
+    if not root.exists():
+        root.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=root.parent) as folder:
+            _unpack(_download(Path(folder)), Path(folder) / "root")
+            _publish(Path(folder) / "root", root)
+    return _kernel_in(root)
+
+
+def _download(folder: Path) -> Path:
+    """The package file; the list of packages is fetched first where a machine has none yet."""
+    download = ["apt-get", "download", "-qq", PACKAGE]
+    try:
+        if subprocess.run(download, cwd=folder, capture_output=True).returncode:
+            subprocess.run(["apt-get", "update", "-qq"], check=True)
+            subprocess.run(download, cwd=folder, check=True)
+    except (OSError, subprocess.CalledProcessError) as error:
+        raise MissingTool(
+            f"the package {PACKAGE} can't be downloaded ({error}); on Debian run 'apt-get update' as root and try "
+            f"again, elsewhere use a kernel with vcan: modprobe vcan"
+        ) from error
+    return next(folder.glob(f"{PACKAGE}_*.deb"))
+
+
+def _unpack(package: Path, root: Path) -> None:
+    subprocess.run(["dpkg", "-x", package, root], check=True)
+
+
+def _publish(unpacked: Path, root: Path) -> None:
+    """One rename, so that nobody sees half a kernel; another run may have been faster."""
+    try:
+        unpacked.rename(root)
+    except OSError:
+        if not root.exists():
+            raise
+        shutil.rmtree(unpacked)
+
+
+def _kernel_in(root: Path) -> Kernel:
+    modules = next((root / "usr/lib/uml/modules").glob("*/kernel"), None)
+    program = root / "usr/bin/linux.uml"
+    if modules is None or not program.exists():
+        raise MissingTool(f"{root} holds no complete kernel: remove the folder and try again")
+    return Kernel(program, modules, _wide_registers() if needs_wide_registers() else None)
+
+
+def needs_wide_registers() -> bool:
+    """Whether this CPU has registers beyond AVX-512, of which the kernel knows nothing (see wide_registers.c)."""
+    return not {"amx_tile", "apx"}.isdisjoint(Path("/proc/cpuinfo").read_text().split())
+
+
+def _wide_registers() -> Path:
+    """The library of wide_registers.c, compiled once for each version of it."""
+    source = Path(__file__).with_name("wide_registers.c")
+    library = cache() / f"wide_registers-{zlib.crc32(source.read_bytes()):08x}.so"
+    if not library.exists():
+        with tempfile.TemporaryDirectory(dir=cache()) as folder:
+            compiled = Path(folder) / library.name
+            subprocess.run(["cc", "-O2", "-shared", "-fPIC", "-o", compiled, source], check=True)
+            compiled.rename(library)
+    return library

@@ -1,0 +1,169 @@
+"""Runs one command in a guest: the user-mode kernel over the host's files, with vcan0 and vcan1 up.
+
+The guest is an ordinary process of this user. As it sees the host's files, so can it change them, except under
+systemd, whose guest writes into a RAM disk over them. What both sides exchange lies in one folder, which the guest
+finds at ``/run/guest``.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from vcan_tests.kernel.fetch import Kernel, cache, fetch_kernel
+
+TIMED_OUT = 124
+NO_STATUS = 125
+SCRIPTS = Path(__file__).parent
+PASSED_ON = ("HOME", "LANG", "LC_ALL", "LOGNAME", "PYTEST_ADDOPTS", "USER")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a guest ended: the command's exit status (124: timed out, 125: the guest died) and the kernel's release."""
+
+    status: int
+    kernel: str
+
+
+def run_in_guest(
+    command: Sequence[str],
+    exchange: Path,
+    *,
+    systemd: bool = False,
+    timeout_s: float | None = None,
+    environment: Mapping[str, str] | None = None,
+) -> Outcome:
+    """Boots a guest, runs the command in the present folder, and halts the guest; its output goes to our stdout.
+
+    Args:
+        command: Program and arguments, as the guest finds them: by path, or in the system's folders.
+        exchange: A new folder, which the guest sees as ``/run/guest``.
+        systemd: Whether a real systemd is the guest's first process, and all writing goes into a RAM disk.
+        timeout_s: Wall time until the guest is ended, in seconds.
+        environment: Variables for the command beside the few that are passed on.
+
+    Raises:
+        MissingTool: no user-mode kernel can be had here.
+    """
+    kernel = fetch_kernel()
+    _furnish(exchange, kernel, "run_systemd.sh" if systemd else "run_plain.sh")
+    _write_script(exchange / "command", command, environment or {})
+    with _own_cpu() as cpu:
+        in_time = _boot(_command_line(kernel, exchange, cpu), timeout_s)
+    release = exchange / "kernel"
+    return Outcome(_status(exchange, in_time), release.read_text().strip() if release.exists() else "no kernel")
+
+
+@contextmanager
+def exchange_folder() -> Iterator[Path]:
+    """A folder for one guest, removed with all that is in it."""
+    with tempfile.TemporaryDirectory(prefix="canhelm-guest-") as folder:
+        yield Path(folder)
+
+
+def _furnish(exchange: Path, kernel: Kernel, run: str) -> None:
+    shutil.copy(SCRIPTS / "init.sh", exchange / "init")
+    (exchange / "init").chmod(0o755)
+    shutil.copy(SCRIPTS / run, exchange / "run")
+    (exchange / "modules").symlink_to(kernel.modules)
+
+
+def _write_script(script: Path, command: Sequence[str], environment: Mapping[str, str]) -> None:
+    """The command as a shell script. A terminal that the host has not is a dumb one, so that nobody colours for it."""
+    passed_on = {name: os.environ[name] for name in PASSED_ON if name in os.environ}
+    terminal = os.environ.get("TERM", "dumb") if os.isatty(1) else "dumb"
+    variables = {**passed_on, "TERM": terminal, "TMPDIR": "/run/tmp", **environment}
+    exports = [f"export {name}={shlex.quote(value)}\n" for name, value in variables.items()]
+    script.write_text(
+        f"#!/bin/sh\n{''.join(exports)}cd {shlex.quote(os.getcwd())} || exit\nexec {shlex.join(command)}\n"
+    )
+    script.chmod(0o755)
+
+
+def _command_line(kernel: Kernel, exchange: Path, cpu: int) -> list[str]:
+    """The guest's process. On one CPU it is 3 to 5 times as fast as on two; it ends when this process dies."""
+    start = ["setpriv", "--pdeathsig", "TERM", "taskset", "-c", str(cpu)]
+    if kernel.preload:
+        start += ["env", f"LD_PRELOAD={kernel.preload}"]
+    root = ["rootfstype=hostfs", "rootflags=/", "rw", f"init={exchange}/init", "lsm=yama"]
+    place = ["mem=1G", f"uml_dir={exchange}", "umid=uml"]
+    output = ["con=null", "con0=null,fd:1", "quiet", "loglevel=0"]
+    return [*start, str(kernel.program), *root, *place, *output, "systemd.unit=guest.target"]
+
+
+@contextmanager
+def _own_cpu() -> Iterator[int]:
+    """A CPU that no other guest of this user has; when all are taken, the last."""
+    cpus = sorted(os.sched_getaffinity(0))
+    folder = cache()
+    folder.mkdir(parents=True, exist_ok=True)
+    for cpu in cpus:
+        with (folder / f"cpu{cpu}.lock").open("w") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                continue
+            yield cpu
+            return
+    yield cpus[-1]
+
+
+def _boot(command_line: list[str], timeout_s: float | None) -> bool:
+    """Runs the guest to its end; whether it ended in time. Whatever happens, none of its processes is left.
+
+    The guest takes the terminal for its own if it gets one; a copying process between spares us that.
+    """
+    with subprocess.Popen(["cat"], stdin=subprocess.PIPE) as output, _ended_by_signals():
+        guest = subprocess.Popen(
+            command_line,
+            stdin=subprocess.DEVNULL,
+            stdout=output.stdin,
+            stderr=output.stdin,
+            start_new_session=True,
+        )
+        try:
+            guest.wait(timeout_s)
+        except subprocess.TimeoutExpired:
+            return False
+        finally:
+            _kill_all(guest)
+    return True
+
+
+def _kill_all(guest: subprocess.Popen[bytes]) -> None:
+    """The guest's helper threads outlive its main process when that is killed; the process group has them all."""
+    with suppress(ProcessLookupError):
+        os.killpg(guest.pid, signal.SIGKILL)
+    guest.wait()
+
+
+@contextmanager
+def _ended_by_signals() -> Iterator[None]:
+    """SIGTERM and SIGHUP end this process as Ctrl-C does: by an exception, so that it clears up."""
+
+    def end(number: int, _frame: object) -> None:
+        raise SystemExit(128 + number)
+
+    before = {number: signal.signal(number, end) for number in (signal.SIGTERM, signal.SIGHUP)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _status(exchange: Path, in_time: bool) -> int:
+    if not in_time:
+        return TIMED_OUT
+    status = exchange / "status"
+    return int(status.read_text()) if status.exists() else NO_STATUS

@@ -1,0 +1,52 @@
+"""The Debian tools that the tests on the kernel's bus call."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+
+PACKAGE_OF = {
+    "candump": "can-utils",
+    "dbus-daemon": "dbus",
+    "halt": "systemd-sysv",
+    "insmod": "kmod",
+    "ip": "iproute2",
+    "tshark": "tshark",
+}
+
+
+class MissingTool(Exception):
+    """Something from outside the project is not there; the message says how to get it."""
+
+
+def require_tools() -> None:
+    """Installs what is missing, where this process is root and has apt.
+
+    Raises:
+        MissingTool: a tool is missing and can't be installed from here.
+    """
+    packages = missing_packages()
+    if not packages:
+        return
+    if os.geteuid() != 0 or shutil.which("apt-get") is None:
+        raise MissingTool(f"missing tools; as root: apt-get install --no-install-recommends {' '.join(packages)}")
+    print(f"installing {', '.join(packages)}", flush=True)
+    try:
+        _install(packages)
+    except subprocess.CalledProcessError as error:
+        raise MissingTool(f"apt-get could not install {' '.join(packages)} ({error}); its words stand above") from error
+
+
+def missing_packages() -> list[str]:
+    """The Debian packages of the tools that are not there."""
+    places = os.environ.get("PATH", "") + ":/usr/sbin:/sbin"
+    return sorted({package for tool, package in PACKAGE_OF.items() if shutil.which(tool, path=places) is None})
+
+
+def _install(packages: list[str]) -> None:
+    command = ["apt-get", "-o", "DPkg::Lock::Timeout=120", "-qq", "-y"]
+    quiet = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}
+    subprocess.run([*command, "update"], env=quiet, check=True)
+    install = [*command, "install", "--no-install-recommends", *packages]
+    subprocess.run(install, env=quiet, check=True, stdout=subprocess.DEVNULL)
