@@ -7,10 +7,10 @@ PIP := $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check
 OUT ?= demo-out
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test lint
+.PHONY: help venv demo test lint vcan-test
 
 help: ## this list
-	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST)
+	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST)
 
 venv: $(VENV)/.stamp-demo ## canhelm in .venv
 
@@ -19,6 +19,9 @@ demo: $(VENV)/.stamp-demo ## the simulated robot drives the published manoeuvres
 
 test: lint ## style, types, import rules, then all tests
 	$(VENV)/bin/pytest
+
+vcan-test: $(VENV)/.stamp-test ## the tests on a kernel's CAN bus and under a real systemd, both booted if need be
+	$(VENV)/bin/python -m vcan_tests.kernel.suite $(ARGS)
 
 lint: $(VENV)/.stamp-test ## style, types and import rules
 	$(VENV)/bin/ruff check .

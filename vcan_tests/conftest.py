@@ -1,18 +1,24 @@
-"""Async tests run on virtual time; those that need sockets, threads or the real clock are marked ``real_time``."""
+"""What a test needs, told by its marks: virtual time unless ``real_time``, ``vcan`` or ``systemd`` says otherwise."""
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import pytest
 
 from daemon.runtime.clock import VirtualTimeLoop
 
+NEEDS = {
+    "vcan": [Path("/sys/class/net/vcan0"), Path("/sys/class/net/vcan1")],
+    "systemd": [Path("/run/systemd/system"), Path("/run/guest/command")],
+}
+
 
 def pytest_asyncio_loop_factories(item: pytest.Item) -> Mapping[str, Callable[[], asyncio.AbstractEventLoop]]:
     """The kind of loop that a test runs on."""
-    if item.get_closest_marker("real_time"):
+    if any(item.get_closest_marker(mark) for mark in ("real_time", *NEEDS)):
         return {"real": asyncio.SelectorEventLoop}
     return {"virtual": VirtualTimeLoop}
 
@@ -22,3 +28,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.get_closest_marker("real_time") or "bench" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.flaky(reruns=2))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """A test of the kernel's bus or of the service fails where there is none: a skipped test proves nothing."""
+    for mark, paths in NEEDS.items():
+        missing = [str(path) for path in paths if item.get_closest_marker(mark) and not path.exists()]
+        if missing:
+            pytest.fail(f"marked {mark}, but here is no {' and no '.join(missing)}: run make vcan-test", pytrace=False)

@@ -6,7 +6,7 @@ import argparse
 import sys
 
 from vcan_tests.kernel.guest import NO_STATUS, TIMED_OUT, exchange_folder, run_in_guest
-from vcan_tests.kernel.tools import MissingTool
+from vcan_tests.kernel.tools import MissingTool, require_tools
 
 
 def main() -> int:
@@ -19,6 +19,7 @@ def main() -> int:
     asked = parser.parse_args()
     environment = dict(pair.split("=", 1) for pair in asked.env)
     try:
+        require_tools()
         with exchange_folder() as exchange:
             outcome = run_in_guest(
                 asked.command, exchange, systemd=asked.systemd, timeout_s=asked.timeout, environment=environment

@@ -6,10 +6,10 @@ import os
 import shutil
 import subprocess
 import tempfile
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
+from vcan_tests.kernel.registers import needs_wide_registers, wide_registers
 from vcan_tests.kernel.tools import MissingTool
 
 PACKAGE = "user-mode-linux"
@@ -78,21 +78,4 @@ def _kernel_in(root: Path) -> Kernel:
     program = root / "usr/bin/linux.uml"
     if modules is None or not program.exists():
         raise MissingTool(f"{root} holds no complete kernel: remove the folder and try again")
-    return Kernel(program, modules, _wide_registers() if needs_wide_registers() else None)
-
-
-def needs_wide_registers() -> bool:
-    """Whether this CPU has registers beyond AVX-512, of which the kernel knows nothing (see wide_registers.c)."""
-    return not {"amx_tile", "apx"}.isdisjoint(Path("/proc/cpuinfo").read_text().split())
-
-
-def _wide_registers() -> Path:
-    """The library of wide_registers.c, compiled once for each version of it."""
-    source = Path(__file__).with_name("wide_registers.c")
-    library = cache() / f"wide_registers-{zlib.crc32(source.read_bytes()):08x}.so"
-    if not library.exists():
-        with tempfile.TemporaryDirectory(dir=cache()) as folder:
-            compiled = Path(folder) / library.name
-            subprocess.run(["cc", "-O2", "-shared", "-fPIC", "-o", compiled, source], check=True)
-            compiled.rename(library)
-    return library
+    return Kernel(program, modules, wide_registers(cache()) if needs_wide_registers() else None)

@@ -1,10 +1,12 @@
-"""The Debian tools that the tests on the kernel's bus call."""
+"""The Debian tools that a guest and the tests in it call."""
 
 from __future__ import annotations
 
 import os
 import shutil
 import subprocess
+
+from vcan_tests.kernel.registers import needs_wide_registers
 
 PACKAGE_OF = {
     "candump": "can-utils",
@@ -41,7 +43,10 @@ def require_tools() -> None:
 def missing_packages() -> list[str]:
     """The Debian packages of the tools that are not there."""
     places = os.environ.get("PATH", "") + ":/usr/sbin:/sbin"
-    return sorted({package for tool, package in PACKAGE_OF.items() if shutil.which(tool, path=places) is None})
+    missing = {package for tool, package in PACKAGE_OF.items() if shutil.which(tool, path=places) is None}
+    if needs_wide_registers() and shutil.which("cc") is None:
+        missing |= {"gcc", "libc6-dev"}
+    return sorted(missing)
 
 
 def _install(packages: list[str]) -> None:
