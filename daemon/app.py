@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import signal
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from socket import socket as Socket
 from typing import TYPE_CHECKING
 
+from canhelm.errors import BusOff
 from daemon.runtime.clock import VirtualTimeLoop
 from daemon.runtime.commands import Commands
 from daemon.runtime.cycle import Cycle
@@ -27,8 +29,8 @@ if TYPE_CHECKING:
     from daemon.api.server import Server
 
 LOGGER = logging.getLogger("canhelm")
-ENDINGS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
-"""Signals that end the daemon in order."""
+BUS_RETRY_S = 1.0
+"""Time between two attempts to open a bus that is not there yet."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,9 +59,7 @@ class App:
         seed: of everything random in the simulated network.
         powered: whether the simulated nodes have power from the start.
         gateway: where other CANopen tools are served; None for nowhere.
-
-    Raises:
-        BusOff: from :meth:`start`, where the interface is missing or down.
+        inherited: sockets that listen already, by their paths; the service manager has opened them and takes them away.
     """
 
     def __init__(
@@ -72,6 +72,7 @@ class App:
         seed: int = 0,
         powered: bool = True,
         gateway: GatewayAccess | None = None,
+        inherited: Mapping[Path, Socket] | None = None,
     ) -> None:
         self.spec = bus
         self.wire = wire = make_wire(bus, profile, seed)
@@ -80,15 +81,18 @@ class App:
         self.medium = wire.medium
         self.bus = wire.bus
         self._powered = powered
+        self._inherited = inherited or {}
+        self._connecting: asyncio.Task[None] | None = None
         self._record = record
         self.recorder: CandumpRecorder | None = None
         self.master = Master(self.bus, profile.network)
         self.devices = Devices(self.master, profile)
         self.vehicle = make_vehicle(profile, self.devices)
         period_s = 1.0 / profile.network.cycle_hz
+        late = profile.network.late_after_cycles
         self.supervisor = Supervisor(self.master, self.devices, self.vehicle, period_s)
         self.cycle = Cycle(
-            self.master, self.devices, period_s, self.supervisor.step, wire.pace, wire.reading_share, wire.good_within
+            self.master, self.devices, period_s, self.supervisor.step, wire.pace, wire.reading_share, late
         )
         commands = Commands(self.supervisor, self._switch_power if self.network else None)
         self.service = Service(profile.name, self.supervisor, commands, self.bus, self.cycle)
@@ -98,12 +102,18 @@ class App:
     def _serve(self, socket: Path) -> Server:
         from daemon.api.server import Server
 
-        return Server(self.service, socket)
+        return Server(self.service, socket, self._inherited.get(socket))
 
     def _serve_tools(self, access: GatewayAccess) -> Gateway309:
         from daemon.api.gateway309 import Gateway309
 
-        return Gateway309(self.supervisor, access.path, tcp_port=access.tcp_port, writable=access.writable)
+        return Gateway309(
+            self.supervisor,
+            access.path,
+            tcp_port=access.tcp_port,
+            writable=access.writable,
+            inherited=self._inherited.get(access.path),
+        )
 
     def _switch_power(self, node: int | str, on: bool) -> None:
         assert self.network is not None
@@ -113,7 +123,13 @@ class App:
             self.network.power_off(node)
 
     async def start(self) -> None:
-        """Open the socket first, then the bus; everything else comes up by itself. Raises BusOff."""
+        """Open the sockets first, then the bus; everything else comes up by itself.
+
+        A bus that is missing or down is waited for; the control cycle ticks meanwhile.
+
+        Raises:
+            Refused, ConfigError, PermissionRefused: a socket or the log cannot be opened.
+        """
         if self.server is not None:
             await self.server.start()
         if self.gateway is not None:
@@ -125,15 +141,39 @@ class App:
             self.service.recorder = self.recorder
         if self.network is not None and self._powered:
             self.network.power_on("all")
-        await self.master.start()
-        self.devices.start()
+        if await self._opens_bus():
+            self.devices.start()
+        else:
+            self._connecting = asyncio.create_task(self._wait_for_bus(), name="waiting for the bus")
         self.cycle.start()
+
+    async def _opens_bus(self) -> bool:
+        try:
+            await self.master.start()
+        except BusOff as error:
+            if self.supervisor.bus_missing != str(error):
+                LOGGER.error("%s", error)
+            self.supervisor.bus_missing = str(error)
+            return False
+        self.supervisor.bus_missing = ""
+        return True
+
+    async def _wait_for_bus(self) -> None:
+        while True:
+            await asyncio.sleep(BUS_RETRY_S)
+            if await self._opens_bus():
+                break
+        LOGGER.info("%s is there", self.spec)
+        self.devices.start()
 
     async def close(self) -> tuple[Drive, ...]:
         """Bring the vehicle to rest, then take everything down; the drives that are not known to be at rest and off."""
         if self.gateway is not None:
             await self.gateway.close()
         doubtful = await self.supervisor.close()
+        if self._connecting is not None:
+            self._connecting.cancel()
+            await asyncio.wait([self._connecting])
         self.cycle.stop()
         await self.devices.close()
         await self.master.close()
@@ -144,30 +184,3 @@ class App:
         if self.recorder is not None:
             self.recorder.close()
         return doubtful
-
-    async def run(self) -> str:
-        """Run until a signal ends it, then go down in order; a second signal does not cut that short.
-
-        Returns:
-            One sentence on how the vehicle was left.
-        """
-        loop = asyncio.get_running_loop()
-        ended = asyncio.Event()
-        for number in ENDINGS:
-            if signal.getsignal(number) is not signal.SIG_IGN:  # nohup ignores the hang-up of a terminal
-                loop.add_signal_handler(number, ended.set)
-        try:
-            await self.start()
-            LOGGER.info("robot %s on %s, socket %s", self.profile.name, self.spec, self.server and self.server.path)
-            await ended.wait()
-            LOGGER.info("going down: stopping the vehicle")
-        finally:
-            doubtful = await self.close()
-        return _farewell(doubtful)
-
-
-def _farewell(doubtful: tuple[Drive, ...]) -> str:
-    if not doubtful:
-        return "the vehicle is at rest and its drives are off"
-    names = ", ".join(f"node {drive.node} ({drive.name})" for drive in doubtful)
-    return f"ended without contact to {names}: make sure yourself that the vehicle is at rest and its drives are off"

@@ -12,7 +12,11 @@ from canhelm.errors import UsageError
 from daemon.runtime.clock import Ticker, VirtualTimeLoop
 from daemon.runtime.cycle import Pace
 from daemon.runtime.pace import LinePace
+from daemon.runtime.sync_pace import SyncPace
+from drivers.bus.broadcast_manager import kernel_repeats
 from drivers.bus.contract import Bus
+from drivers.bus.interfaces import open_bus
+from drivers.bus.socketcan import SocketCanBus
 from drivers.encoder.objects import OBJECTS as ENCODER_OBJECTS
 from drivers.epos.serial_bus import SerialGatewayBus
 from drivers.epos.serial_conversation import Transport
@@ -25,6 +29,8 @@ from drivers.simulated.serial_wire import SerialCable, SerialPty
 from profiles.schema import Profile
 
 DEFAULT_BAUD = 115200
+READING_SHARE = 0.8
+"""Of the longest cycle over a serial line, what its readings may take."""
 _RS232 = re.compile(r"rs232(?::(?P<device>[^@]+))?(?:@(?P<baud>\d+))?")
 OnLost = Callable[[str], None]
 
@@ -40,7 +46,6 @@ class Wire:
         cable: the simulated serial cable, where there is one.
         pace: makes what ticks the control cycle, from period and callback.
         reading_share: share of a cycle that its readings may take.
-        good_within: periods within which a cycle has to end to be a good one; a line may be slower than planned.
     """
 
     bus: Bus
@@ -50,7 +55,6 @@ class Wire:
     cable: SerialCable | None = None
     pace: Callable[[float, Callable[[], None]], Pace] = Ticker
     reading_share: float = 0.5
-    good_within: float = 1.0
 
 
 def make_wire(spec: str, profile: Profile, seed: int) -> Wire:
@@ -71,13 +75,18 @@ def make_wire(spec: str, profile: Profile, seed: int) -> Wire:
         return Wire(medium.port("master"), profile, network, medium)
     serial = _RS232.fullmatch(spec)
     if serial is None:
-        from drivers.bus.python_can import open_bus  # here, so that a simulation does not wait for python-can
-
-        return Wire(open_bus(spec, profile.network.bit_rate), profile)
+        return _can_wire(open_bus(spec, profile.network.bit_rate), profile)
     baud = int(serial["baud"] or DEFAULT_BAUD)
     if serial["device"]:
         return _serial_wire(serial["device"], partial(_open_device, serial["device"], baud), profile, baud)
     return _simulated_serial(profile, baud, seed)
+
+
+def _can_wire(bus: Bus, profile: Profile) -> Wire:
+    """On the kernel's CAN the kernel sends SYNC, where it can, and SYNC paces the cycle."""
+    if isinstance(bus, SocketCanBus) and kernel_repeats():
+        return Wire(bus, profile, pace=partial(SyncPace, bus))
+    return Wire(bus, profile)
 
 
 def _simulated_serial(profile: Profile, baud: int, seed: int) -> Wire:
@@ -103,7 +112,16 @@ def _serial_wire(
     encoders = {encoder.node: ENCODER_OBJECTS for encoder in profile.encoders.values()}
     gateway = profile.drives[gateway_of(profile)].node
     bus = SerialGatewayBus(name, connect, baud, profile.network.bit_rate, gateway, encoders, facts(profile, baud))
-    return Wire(bus, shrunk, network, medium, cable, partial(LinePace, bus), 0.9, 3.0)
+    late = shrunk.network.late_after_cycles
+    return Wire(
+        bus,
+        shrunk,
+        network,
+        medium,
+        cable,
+        partial(LinePace, bus, late / shrunk.network.cycle_hz),
+        READING_SHARE * late,
+    )
 
 
 def _open_device(device: str, baud: int, on_lost: OnLost) -> Transport:

@@ -48,6 +48,8 @@ class Network(Part, frozen=True, kw_only=True):
     """Time a node has to answer one SDO request."""
     patience_s: Annotated[float, Meta(ge=0)] = 0.0
     """Time for which a request to a dead node may keep the wire from the others; no node is called silent sooner."""
+    late_after_cycles: Annotated[float, Meta(ge=1)] = 1.0
+    """Periods after which a cycle is late and a target of it is stale; a serial line may be slower than planned."""
     synchronous: bool = True
     """PDOs go with SYNC; without it targets count at once and readings come on request (as over the RS-232 gateway)."""
     gateway: str | None = None

@@ -16,15 +16,19 @@ class LinePace:
 
     Args:
         bus: tells when its cyclic requests are done.
-        period_s: nominal period; a tick comes at the latest after it.
+        latest_s: a tick comes at the latest after this time, so that a line that hangs does not stop the watch.
+        period_s: nominal period.
         callback: called at each tick; must not block.
 
     Attributes:
         max_lateness_s: worst delay of a tick behind the nominal period.
+        synced: never; the cycle sends the SYNC that begins the readings.
     """
 
-    def __init__(self, bus: SerialGatewayBus, period_s: float, callback: Callable[[], None]) -> None:
+    def __init__(self, bus: SerialGatewayBus, latest_s: float, period_s: float, callback: Callable[[], None]) -> None:
         self.max_lateness_s = 0.0
+        self.synced = False
+        self._latest_s = latest_s
         self._period_s = period_s
         self._callback = callback
         self._timer: asyncio.TimerHandle | None = None
@@ -35,7 +39,7 @@ class LinePace:
         """Tick from now on, on the running loop."""
         self._loop = asyncio.get_running_loop()
         self._last_s = self._loop.time()
-        self._timer = self._loop.call_later(self._period_s, self._tick)
+        self._timer = self._loop.call_later(self._latest_s, self._tick)
 
     def stop(self) -> None:
         """Tick no more."""
@@ -52,5 +56,5 @@ class LinePace:
         now = self._loop.time()
         self.max_lateness_s = max(self.max_lateness_s, now - self._last_s - self._period_s)
         self._last_s = now
-        self._timer = self._loop.call_later(self._period_s, self._tick)
+        self._timer = self._loop.call_later(self._latest_s, self._tick)
         self._callback()

@@ -37,6 +37,7 @@ class Supervisor:
         lease_timeout_s: how long a motion goes on without its holder's renewal.
 
     Attributes:
+        bus_missing: why the bus could not be opened yet; empty once it is.
         stop, estop, fault, power_off, until_rest: those of :class:`daemon.runtime.stopping.Stopping`.
     """
 
@@ -52,11 +53,13 @@ class Supervisor:
         self.active_limits: tuple[str, ...] = ()
         self.measurement: Measurement | None = None
         self.command = vehicle.zero
+        self.bus_missing = ""
         self.observers: list[Callable[[], None]] = []
-        self._period_s = period_s
+        self._stale_s = master.network.late_after_cycles * period_s
         self._numbers = itertools.count(1)
         self._tasks = TaskSet(self._on_task_failure)
-        self._watch = DeviceWatch(devices, period_s, master.network.patience_s)
+        network = master.network
+        self._watch = DeviceWatch(devices, period_s, network.patience_s, network.late_after_cycles)
         self._stopping = stopping = Stopping(devices, vehicle, self.motions, self._tasks, self.log, self._drop_targets)
         self.stop, self.estop, self.fault = stopping.stop, stopping.estop, stopping.fault
         self.power_off, self.until_rest = stopping.power_off, stopping.until_rest
@@ -84,7 +87,21 @@ class Supervisor:
     @property
     def message(self) -> str:
         """One sentence about the state: what is wrong, or what is waited for."""
-        return self._stopping.message or "; ".join(device.status_sentence for device in self._not_ready())
+        return self._stopping.message or self.bus_missing or "; ".join(self._waiting())
+
+    @property
+    def sentence(self) -> str:
+        """State and message in one short line: of several nodes that are waited for, the first one."""
+        waiting = self._waiting()
+        if self._stopping.message or self.bus_missing or not waiting:
+            return f"{self.state}: {self.message}" if self.message else str(self.state)
+        others = f" (and {len(waiting) - 1} more)" if len(waiting) > 1 else ""
+        first = waiting[0] + others
+        return first if first.startswith(str(self.state)) else f"{self.state}: {first}"
+
+    def _waiting(self) -> list[str]:
+        """What is told of each node that is not ready."""
+        return [device.status_sentence for device in self._not_ready() if device.status_sentence]
 
     @property
     def anything_enabled(self) -> bool:
@@ -176,7 +193,7 @@ class Supervisor:
         self.command, self.active_limits = self.vehicle.gate(wanted, measurement, self.command, dt_s)
         if self.command.release_brake:
             self.brakes.follow(self.command.release_brake)
-        deadline = now_s + self._period_s
+        deadline = now_s + self._stale_s
         for drive, speed in zip(self.vehicle.drives, self.command.wheel_speed_m_s, strict=True):
             if drive.node_state is NodeState.READY:
                 drive.command_speed(speed)

@@ -25,12 +25,16 @@ class DeviceWatch:
         devices: all devices.
         period_s: the control cycle's period.
         patience_s: see ``Network.patience_s``.
+        late_after_cycles: see ``Network.late_after_cycles``.
     """
 
-    def __init__(self, devices: Devices, period_s: float, patience_s: float = 0.0) -> None:
+    def __init__(
+        self, devices: Devices, period_s: float, patience_s: float = 0.0, late_after_cycles: float = 1.0
+    ) -> None:
         self._devices = tuple(devices.by_node.values())
         self._by_node = devices.by_node
         self._period_s = period_s
+        self._late_s = (late_after_cycles + LATE_CYCLES - 1) * period_s
         self._silent_cycles = max(SILENT_CYCLES, math.ceil(patience_s / period_s))
         self._unread: dict[int, tuple[float, int]] = {}
         self._looked_s: float | None = None
@@ -45,7 +49,7 @@ class DeviceWatch:
             powered: whether a motion runs or any drive has its power stage on. While nothing is powered, a node that
                 goes away is waited for and needs no reset.
         """
-        if self._looked_s is not None and now_s - self._looked_s > LATE_CYCLES * self._period_s:
+        if self._looked_s is not None and now_s - self._looked_s > self._late_s:
             self._stall_end_s, self._stall_s = now_s, now_s - self._looked_s - self._period_s
         self._looked_s = now_s
         for device in self._devices:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -40,6 +40,7 @@ class Bus(ABC):
         name: the interface's name as it stands in logs (``vcan0``).
         bit_rate: bit/s.
         receiver: called with every frame that another participant sent; set by the one owner of the interface.
+        on_silent: told of a node whose silence is certain, because who forwards to it waited for it in vain.
         taps: called with every frame, received or sent by this interface, in wire order (recorder, monitor).
         counters: what went over the interface.
     """
@@ -48,6 +49,7 @@ class Bus(ABC):
         self.name = name
         self.bit_rate = bit_rate
         self.receiver: FrameHandler | None = None
+        self.on_silent: Callable[[int], None] | None = None
         self.taps: list[FrameHandler] = []
         self.counters = BusCounters()
 
@@ -63,6 +65,14 @@ class Bus(ABC):
             can_id: 11-bit identifier, with :data:`RTR_FLAG` for a remote frame.
             data: 0 to 8 bytes.
             deadline_s: loop time after which the frame is worthless: it is then dropped and counted.
+        """
+
+    def needs(self, can_ids: Collection[int]) -> None:
+        """Tell which identifiers the receiver needs, so that a back end which can keeps others away from it.
+
+        Args:
+            can_ids: 11-bit identifiers of data and remote frames alike. It is looked into later, too, so it may grow;
+                call this again when it has.
         """
 
     @abstractmethod

@@ -78,8 +78,7 @@ class Guard:
             if now_s >= self._next_s - EARLY * guard_time_s:
                 self._ask(now_s)
         elif now_s >= asked_s + self._lost_s:
-            self._armed = False
-            self._on_lost(now_s - self._alive_s)
+            self.lose(now_s)
         elif not self._repeated and now_s >= asked_s + REPEAT_AFTER * guard_time_s:
             self._repeated = True
             self._request(RTR_FLAG | ERROR_CONTROL_COB_ID + self.node)
@@ -96,6 +95,12 @@ class Guard:
         self._next_s = now_s + self.guard_time_s
         self._repeated = False
         self._request(RTR_FLAG | ERROR_CONTROL_COB_ID + self.node)
+
+    def lose(self, now_s: float) -> None:
+        """The node is known to be silent; its guard reports it lost."""
+        if self._armed:
+            self._armed = False
+            self._on_lost(now_s - self._alive_s)
 
     def answer(self, toggle: int, now_s: float) -> bool:
         """Take an answer; False where its toggle bit did not alternate. The first answer may have either."""

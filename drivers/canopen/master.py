@@ -69,6 +69,7 @@ class Master:
         self.lss = LssMaster(bus.send, network.sdo_timeout_s, self.counters)
         self.subscribe(LSS_ANSWER_COB_ID, self.lss.receive)
         bus.receiver = self._receive
+        bus.on_silent = self._on_silent
 
     async def start(self) -> None:
         """Open the bus on the running loop. Raises BusOff where it is down or missing."""
@@ -90,6 +91,7 @@ class Master:
     def subscribe(self, can_id: int, handler: FrameHandler) -> None:
         """Hand every frame with this identifier to a handler, in place of the one before."""
         self._handlers[can_id] = handler
+        self.bus.needs(self._handlers.keys())
 
     def who(self, node: int) -> str:
         """A node for people: ``node 3 (front_left)``."""
@@ -158,6 +160,10 @@ class Master:
     def _send_guard_request(self, can_id: int) -> None:
         deadline = asyncio.get_running_loop().time() + REPEAT_AFTER * self.network.guard_time_ms / 1e3
         self.bus.send(can_id, b"", deadline)
+
+    def _on_silent(self, node: int) -> None:
+        if node in self._guards:
+            self._guards[node].lose(asyncio.get_running_loop().time())
 
     def guard_due(self, now_s: float) -> None:
         """Send the guard requests that are due and notice lost nodes; called by good control cycles only."""

@@ -68,6 +68,7 @@ class EposDrive(CanopenDevice):
         self._rpdo1, self._rpdo3 = rpdo_cob_id(1, config.node), rpdo_cob_id(3, config.node)
         self._send = master.bus.send
         self._period_s = 1.0 / master.network.cycle_hz
+        self._stale_s = master.network.late_after_cycles * self._period_s
         self.turns = Turns(self.who, config.node)
         self.waiters = StatuswordWaiters(self.who, config.node)
         master.subscribe(tpdo_cob_id(1, config.node), self._on_tpdo1)
@@ -107,7 +108,7 @@ class EposDrive(CanopenDevice):
     def _command(self, controlword: int) -> None:
         """Send a controlword now; it counts at the next SYNC and is repeated by each cycle."""
         self._controlword = controlword
-        self.transmit(asyncio.get_running_loop().time() + self._period_s)
+        self.transmit(asyncio.get_running_loop().time() + self._stale_s)
 
     def _command_unless_stopped(self, controlword: int) -> None:
         self.turns.require_unstopped()
@@ -187,7 +188,7 @@ class EposDrive(CanopenDevice):
         self._drop_target()
         self._controlword = int(Command.QUICK_STOP)
         if self.node_state is NodeState.READY and self.state is not DriveState.DISABLED:
-            soon_s = asyncio.get_running_loop().time() + self._period_s
+            soon_s = asyncio.get_running_loop().time() + self._stale_s
             self._send(self._rpdo3, make_rpdo3(Command.QUICK_STOP, self.mode), soon_s)
             self.transmit(soon_s)
 

@@ -168,9 +168,9 @@ class SerialGatewayBus(Bus):
         elif can_id == 0x080:
             self._readings.begin_round(self.silent)
         elif node == self.gateway:
-            self.write(EPOS["controlword"].index, 0, data[:2], deadline_s, urgent=True)
+            self.write(EPOS["controlword"].index, 0, data[:2], deadline_s)
         else:
-            self._submit(make_send_can_frame(can_id, data), node, deadline_s, urgent=function == 0x400)
+            self._submit(make_send_can_frame(can_id, data), node, deadline_s, urgent=True)
 
     def write(
         self,
@@ -179,7 +179,6 @@ class SerialGatewayBus(Bus):
         value: bytes,
         deadline_s: float,
         *,
-        urgent: bool = False,
         on_written: Callable[[], None] | None = None,
     ) -> None:
         """Write an object of the gateway drive itself; ``on_written`` is called when it has taken it."""
@@ -188,7 +187,7 @@ class SerialGatewayBus(Bus):
             self.gateway,
             deadline_s,
             (lambda _: on_written()) if on_written is not None else None,
-            urgent=urgent,
+            urgent=True,
         )
 
     def _command(self, command: NmtCommand, node: int) -> None:
@@ -220,7 +219,7 @@ class SerialGatewayBus(Bus):
             self._answer_from_memory(node)
         elif node not in self.silent:
             request = make_request_can_frame(0x700 + node, 1)
-            self._submit(request, node, deadline_s, lambda data: self._state_of(node, data[0] & 0x7F))
+            self._submit(request, node, deadline_s, lambda data: self._state_of(node, data[0] & 0x7F), urgent=True)
 
     def _answer_from_memory(self, node: int) -> None:
         loop = asyncio.get_running_loop()
@@ -256,6 +255,8 @@ class SerialGatewayBus(Bus):
                     take(result.data)
             elif isinstance(result, Answer) and result.error in SILENT:
                 self._on_silence(node)
+                if self.on_silent is not None:
+                    self.on_silent(node)
             elif not isinstance(result, BusOff):
                 self.counters.dropped_stale += 1
             if then is not None:

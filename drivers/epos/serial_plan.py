@@ -37,6 +37,8 @@ PATIENCE_S = 0.6
 """A little more than a gateway waits for a node that is dead (assumed)."""
 LIFE_TIME_FACTOR = 2
 """A broken conversation costs the line half a second; a vehicle that moves is then stopped anyway."""
+LATE_AFTER_CYCLES = 3.0
+"""A line may be slower than planned."""
 REACTION_CYCLES_CAN = 2
 REACTION_CYCLES_SERIAL = 3
 """Cycles from something that happens to the wheels' answer: read, decide, written behind others."""
@@ -130,6 +132,7 @@ def serial_profile(profile: Profile, baud: int) -> Profile:
             patience_s=PATIENCE_S,
             boot_deadline_s=30.0,
             sdo_timeout_s=2.5,
+            late_after_cycles=LATE_AFTER_CYCLES,
             synchronous=False,
             gateway=gateway,
         ),
