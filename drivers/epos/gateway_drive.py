@@ -21,6 +21,8 @@ from profiles.schema import DriveConfig
 
 AHEAD_CYCLES = 4
 """Control cycles of travel that a target lies ahead, the way of the ramp not counted."""
+LEAD_SHARE = 0.8
+"""Of the limit of the following error, what a target may lie ahead of a wheel that does not turn."""
 HALT = 0x0100
 
 
@@ -79,10 +81,17 @@ class GatewayDrive(EposDrive):
         if abs(rpm) != self._written_rpm:
             self._write_velocity(abs(rpm), deadline_s)
         travel_s = ahead_s(self.target_speed_m_s, self._period_s, self.config.acceleration_m_s2)
-        target_qc = self._travel.raw_qc + round(rpm / 60.0 * self._qc_per_turn * travel_s)
+        lead_qc = self._lead_qc(rpm / 60.0 * self._qc_per_turn * travel_s, travel_s)
+        target_qc = self._travel.raw_qc + round(lead_qc)
         self._bus.write(OBJECTS["target_position"].index, 0, _int32(target_qc), deadline_s)
         self._write_controlword(Command.ENABLE_OPERATION, deadline_s)
         self._write_controlword(PPM_ABSOLUTE_AT_ONCE, deadline_s)
+
+    def _lead_qc(self, wanted_qc: float, travel_s: float) -> float:
+        """How far ahead a target may lie, so that a wheel that is held up does not fall behind too far and trip."""
+        moving_qc = abs(self.rpm_from_speed(self.speed_m_s)) / 60.0 * self._qc_per_turn * travel_s
+        most_qc = LEAD_SHARE * self.config.max_following_error_qc + moving_qc
+        return max(-most_qc, min(wanted_qc, most_qc))
 
     def _write_velocity(self, rpm: int, deadline_s: float) -> None:
         def written() -> None:

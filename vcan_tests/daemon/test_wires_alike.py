@@ -32,7 +32,7 @@ SEQUENCE: tuple[tuple[str, dict[str, Any], int], ...] = (
 """Methods, parameters, and the exit codes that the command line makes of their outcomes."""
 
 
-@pytest.mark.parametrize("bus", ["simulated", "rs232"])
+@pytest.mark.parametrize("bus", ["simulated", "rs232", "rs232@38400"])
 async def test_the_same_commands_end_alike_over_can_and_over_a_serial_line(bus: str) -> None:
     async with running_robot(bus=bus, expect_errors=True) as robot:
         for method, params, code in SEQUENCE:
