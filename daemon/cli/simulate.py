@@ -107,7 +107,7 @@ async def _on_terminal(
 
 async def _on_interface(profile: Profile, nodes: str | None, spec: str, seed: int) -> None:
     """Put the nodes onto a CAN interface; each frame has the time of the simulated wire before that of the real one."""
-    from drivers.bus.python_can import open_bus
+    from drivers.bus.interfaces import open_bus
     from drivers.simulated.bus import SimulatedBus
     from drivers.simulated.network import SimulatedNetwork
 

@@ -139,6 +139,7 @@ class Ticker:
         missed: ticks skipped.
         late: calls made more than half a period behind their deadline.
         max_lateness_s: worst delay of a call behind its deadline.
+        synced: never; who is called sends SYNC.
     """
 
     def __init__(self, period_s: float, callback: Callable[[], None]) -> None:
@@ -147,6 +148,7 @@ class Ticker:
         self.missed = 0
         self.late = 0
         self.max_lateness_s = 0.0
+        self.synced = False
         self._callback = callback
         self._start_s = 0.0
         self._due = 0

@@ -18,6 +18,8 @@ class Pace(Protocol):
 
     max_lateness_s: float
     """Worst delay of a tick behind its time."""
+    synced: bool
+    """Whether the tick is a SYNC that was on the wire; the cycle sends one otherwise."""
 
     def start(self) -> None:
         """Tick from now on, on the running loop."""
@@ -60,6 +62,9 @@ class Cycle:
         reading_share: share of the period that the readings may take before the step runs without those that are
             missing.
         good_within: periods within which a cycle has to end to be a good one.
+
+    Attributes:
+        on_good: called with the loop's time at the end of each good cycle.
     """
 
     def __init__(
@@ -74,6 +79,7 @@ class Cycle:
     ) -> None:
         self.counters = CycleCounters()
         self.period_s = period_s
+        self.on_good: Callable[[float], None] | None = None
         self._master = master
         self._devices = devices
         self._step = step
@@ -105,7 +111,8 @@ class Cycle:
         self._tick_s = self._loop.time()
         ready = NodeState.READY
         self._missing = {node for node, device in self._devices.by_node.items() if device.node_state is ready}
-        self._master.sync()
+        if not self._ticker.synced:
+            self._master.sync()
         self._waiting = True
         if self._missing:
             self._deadline = self._loop.call_at(self._tick_s + self._reading_s, self._on_deadline)
@@ -142,5 +149,7 @@ class Cycle:
         counters.max_lateness_s = max(counters.max_lateness_s, lateness)
         if end <= self._tick_s + self._good_s:
             self._master.guard_due(end)
+            if self.on_good is not None:
+                self.on_good(end)
         else:
             counters.late_cycles += 1

@@ -1,4 +1,4 @@
-"""Any interface that python-can knows, on the running loop: SocketCAN, slcan, vendor adapters.
+"""Any interface that python-can knows, on the running loop: slcan, vendor adapters.
 
 Frames come through a file descriptor on the loop where the interface has one, else through one reader thread. Frames
 that the interface has no room for wait here, most urgent first, until they fit or their deadline passes. An interface
@@ -14,7 +14,6 @@ import logging
 import math
 import threading
 import time
-from heapq import heapify, heappop, heappush
 from pathlib import PurePath
 from typing import Any
 
@@ -22,46 +21,29 @@ import can
 
 from canhelm.errors import BusOff, UsageError
 from drivers.bus.contract import ID_MASK, RTR_FLAG, Bus
+from drivers.bus.controller import BUS_OFF_CAUSES
+from drivers.bus.transmit_queue import TransmitQueue
 from drivers.bus.wire_time import LoadMeter, frame_bits
 
 LOGGER = logging.getLogger("canhelm.bus")
 
-QUEUE_DEPTH = 64
 MAX_BYTES = 8
-RETRY_S = 0.001
 REOPEN_S = 1.0
 READER_TIMEOUT_S = 0.1
-SERIAL_SEND_TIMEOUT_S = 0.01
-"""Longest time that a serial adapter may hold up the loop; SocketCAN never does."""
+SEND_TIMEOUT_S = 0.01
+"""Longest time that an adapter may hold up the loop."""
 OPTIONS: dict[str, dict[str, Any]] = {"slcan": {"timeout": 0.0}}
 """What interfaces need beside channel and bit rate: a serial port that does not wait for the next byte."""
 
-NO_KERNEL_CAN = (
-    "this kernel has no CAN: sudo modprobe can_raw, or another kernel; a serial adapter (slcan:DEVICE) needs none"
-)
 _GONE = {errno.ENETDOWN, errno.ENODEV, errno.ENXIO, errno.EIO, errno.EBADF}
 _ERROR_CLASS_BUS_OFF = 0x40  # linux/can/error.h
 
-_Queued = tuple[int, int, int, bytes, float]
-"""Priority on the wire, order of queueing, identifier with flags, data, deadline."""
 
-
-def open_bus(spec: str, bit_rate: int) -> PythonCanBus:
-    """The bus that a specification names; it is opened by its :meth:`~PythonCanBus.open`.
-
-    Args:
-        spec: ``INTERFACE:CHANNEL``, for instance ``socketcan:can0`` or ``slcan:/dev/ttyUSB0``.
-        bit_rate: bit/s; interfaces that the system configures (SocketCAN) keep theirs.
-
-    Raises:
-        UsageError: the specification is not of that form, or python-can has no such interface.
-    """
-    interface, colon, channel = spec.partition(":")
-    if not (interface and colon and channel):
-        raise UsageError(f"{spec!r} names no bus", value=spec, remedy="give INTERFACE:CHANNEL, such as socketcan:can0")
+def python_can_bus(interface: str, channel: str, bit_rate: int) -> PythonCanBus:
+    """The bus of one of python-can's interfaces. Raises UsageError where it has no such interface."""
     if interface not in can.VALID_INTERFACES:
         known = ", ".join(sorted(can.VALID_INTERFACES))
-        raise UsageError(f"there is no CAN interface {interface!r}", value=spec, remedy=f"use one of {known}")
+        raise UsageError(f"there is no CAN interface {interface!r}", value=interface, remedy=f"use one of {known}")
     return PythonCanBus(interface, channel, bit_rate)
 
 
@@ -81,14 +63,11 @@ class PythonCanBus(Bus):
         self.channel = channel
         self.down: str | None = None
         self.foreign = 0
-        self._send_timeout_s = 0.0 if interface == "socketcan" else SERIAL_SEND_TIMEOUT_S
+        self._queue = TransmitQueue(self._transmit, self.counters)
         self._meter = LoadMeter(bit_rate)
         self._link: can.BusABC | None = None
         self._fd: int | None = None
         self._reader: threading.Thread | None = None
-        self._pending: list[_Queued] = []
-        self._order = 0
-        self._retry: asyncio.TimerHandle | None = None
         self._reopening: asyncio.Task[None] | None = None
 
     async def open(self) -> None:
@@ -109,24 +88,15 @@ class PythonCanBus(Bus):
         """Share of the last second that the frames seen here kept the wire busy, 0 to 1."""
         return self._meter.load(self._loop.time())
 
+    def details(self) -> dict[str, Any]:
+        """What is wrong with the interface, if anything is."""
+        trouble = {"down": self.down, "remedy": self._remedy()} if self.down else {}
+        return {**trouble, "foreign": self.foreign}
+
     def send(self, can_id: int, data: bytes = b"", deadline_s: float = math.inf) -> None:
         """Send one frame or queue it; see :meth:`Bus.send`. Raises ValueError for what no base frame can be."""
         frame_bits(can_id, data)
-        if not self._pending and self._transmit(can_id, data):
-            return
-        if self._link is None:
-            self.counters.dropped_stale += 1
-            return
-        if len(self._pending) >= QUEUE_DEPTH:
-            self._drop_stale()
-        if len(self._pending) >= QUEUE_DEPTH:
-            self.counters.dropped_full += 1
-            return
-        self._order += 1
-        priority = (can_id & ID_MASK) << 1 | (can_id & RTR_FLAG != 0)
-        heappush(self._pending, (priority, self._order, can_id, data, deadline_s))
-        if self._retry is None:
-            self._retry = self._loop.call_later(RETRY_S, self._send_pending)
+        self._queue.send(can_id, data, deadline_s)
 
     def _transmit(self, can_id: int, data: bytes) -> bool:
         """Hand a frame to the interface; False where it has no room for it or is gone."""
@@ -137,7 +107,7 @@ class PythonCanBus(Bus):
             arbitration_id=can_id & ID_MASK, is_extended_id=False, is_remote_frame=remote, data=None if remote else data
         )
         try:
-            self._link.send(message, timeout=self._send_timeout_s)
+            self._link.send(message, timeout=SEND_TIMEOUT_S)
         except (can.CanError, OSError) as error:
             if _error_number(error) in _GONE:
                 self._lose(error)
@@ -145,21 +115,6 @@ class PythonCanBus(Bus):
         self.counters.sent += 1
         self._show(can_id, data, self._loop.time())
         return True
-
-    def _send_pending(self) -> None:
-        self._retry = None
-        self._drop_stale()
-        while self._pending and self._transmit(self._pending[0][2], self._pending[0][3]):
-            heappop(self._pending)
-        if self._pending:
-            self._retry = self._loop.call_later(RETRY_S, self._send_pending)
-
-    def _drop_stale(self) -> None:
-        now = self._loop.time()
-        wanted = [queued for queued in self._pending if queued[4] >= now]
-        self.counters.dropped_stale += len(self._pending) - len(wanted)
-        heapify(wanted)
-        self._pending = wanted
 
     def _on_readable(self) -> None:
         try:
@@ -220,7 +175,7 @@ class PythonCanBus(Bus):
         self.counters.error_frames += 1
         if message.arbitration_id & _ERROR_CLASS_BUS_OFF and self.down is None:
             self.down = "bus-off"
-            LOGGER.error("%s is bus-off (%s)", self.name, "check wiring, termination and bit rate; " + self._remedy())
+            LOGGER.error("%s is bus-off (%s; %s)", self.name, BUS_OFF_CAUSES, self._remedy())
 
     def _loop_time(self, wall_s: float) -> float:
         """The loop's time of a wall-clock stamp less than a second old; now for interfaces with clocks of their own."""
@@ -239,6 +194,7 @@ class PythonCanBus(Bus):
         except (can.CanError, OSError, ValueError) as error:
             raise self._bus_off(error) from error
         self._link = link
+        self._queue.open()
         try:
             self._listen(link)
         except (can.CanError, OSError) as error:
@@ -270,11 +226,7 @@ class PythonCanBus(Bus):
         if self._fd is not None:
             self._loop.remove_reader(self._fd)
             self._fd = None
-        if self._retry is not None:
-            self._retry.cancel()
-            self._retry = None
-        self.counters.dropped_stale += len(self._pending)
-        self._pending = []
+        self._queue.close()
         return link
 
     def _shut_down(self, link: can.BusABC) -> None:
@@ -301,17 +253,10 @@ class PythonCanBus(Bus):
         LOGGER.info("%s is back", self.name)
 
     def _bus_off(self, error: Exception) -> BusOff:
-        remedy = NO_KERNEL_CAN if _error_number(error) == errno.EAFNOSUPPORT else self._remedy()
-        return BusOff(f"{self.interface} interface {self.channel} is down or missing: {error}", remedy=remedy)
+        return BusOff(f"{self.interface} interface {self.channel} is down or missing: {error}", remedy=self._remedy())
 
     def _remedy(self) -> str:
-        if self.interface != "socketcan":
-            return (
-                "is the adapter plugged in, may this user open it, and are its driver and python-can extra installed?"
-            )
-        if self.channel.startswith("vcan"):
-            return f"sudo ip link add dev {self.channel} type vcan; sudo ip link set {self.channel} up"
-        return f"sudo ip link set {self.channel} up type can bitrate {self.bit_rate} restart-ms 100"
+        return "is the adapter plugged in, may this user open it, and are its driver and python-can extra installed?"
 
 
 def _error_number(error: Exception) -> int | None:

@@ -17,7 +17,7 @@ import pytest
 from canopen.sdo.client import SdoClient
 
 from canhelm.errors import Aborted
-from drivers.bus.python_can import PythonCanBus, open_bus
+from drivers.bus.python_can import PythonCanBus, python_can_bus
 from drivers.canopen.boot import NodeBoot
 from drivers.canopen.codes import NmtState
 from drivers.canopen.master import Master, NodeEvent
@@ -123,7 +123,7 @@ class Twins:
 @asynccontextmanager
 async def twins(channel: str) -> AsyncIterator[Twins]:
     """Simulated devices with power, and the library as their master."""
-    bridge = open_bus(f"virtual:{channel}", 1_000_000)
+    bridge = python_can_bus("virtual", channel, 1_000_000)
     await bridge.open()
     async with peer_network(channel) as peer:
         made = Twins(peer, bridge)
@@ -277,7 +277,7 @@ class Local:
 async def local(channel: str) -> AsyncIterator[Local]:
     """A node of the library, and this master."""
     async with peer_network(channel) as peer:
-        made = Local(peer, open_bus(f"virtual:{channel}", 1_000_000))
+        made = Local(peer, python_can_bus("virtual", channel, 1_000_000))
         await made.master.start()
         try:
             yield made

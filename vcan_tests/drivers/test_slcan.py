@@ -15,7 +15,7 @@ import pytest
 from canhelm.errors import BusOff
 from drivers.bus import python_can
 from drivers.bus.contract import RTR_FLAG
-from drivers.bus.python_can import PythonCanBus, open_bus
+from drivers.bus.python_can import PythonCanBus, python_can_bus
 
 pytestmark = [pytest.mark.real_time, pytest.mark.timeout(30)]
 
@@ -68,7 +68,7 @@ async def adapter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncItera
 
 
 def bus_of(adapter: Adapter) -> PythonCanBus:
-    return open_bus(f"slcan:{adapter.path}", 500_000)
+    return python_can_bus("slcan", str(adapter.path), 500_000)
 
 
 async def until(condition: Callable[[], bool]) -> None:
