@@ -14,6 +14,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m vcan_tests.kernel", description=__doc__)
     parser.add_argument("--systemd", action="store_true", help="boot a real systemd; writing goes into a RAM disk")
     parser.add_argument("--timeout", type=float, metavar="S", help="end the guest after so many seconds")
+    parser.add_argument("--show-kernel", action="store_true", help="show the kernel's own messages")
     parser.add_argument("--env", action="append", default=[], metavar="K=V", help="a variable for the command")
     parser.add_argument("command", nargs="+", metavar="CMD ARG...")
     asked = parser.parse_args()
@@ -22,7 +23,12 @@ def main() -> int:
         require_tools()
         with exchange_folder() as exchange:
             outcome = run_in_guest(
-                asked.command, exchange, systemd=asked.systemd, timeout_s=asked.timeout, environment=environment
+                asked.command,
+                exchange,
+                systemd=asked.systemd,
+                timeout_s=asked.timeout,
+                show_kernel=asked.show_kernel,
+                environment=environment,
             )
     except MissingTool as error:
         print(f"no guest: {error}", file=sys.stderr)
@@ -30,7 +36,7 @@ def main() -> int:
     if outcome.status == TIMED_OUT:
         print(f"the guest was ended after {asked.timeout:g} s", file=sys.stderr)
     if outcome.status == NO_STATUS:
-        print("the guest died before its command ended", file=sys.stderr)
+        print("the guest died before its command ended; --show-kernel tells more", file=sys.stderr)
     return outcome.status
 
 

@@ -11,15 +11,14 @@ import fcntl
 import os
 import shlex
 import shutil
-import signal
-import subprocess
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from vcan_tests.kernel.fetch import Kernel, cache, fetch_kernel
+from vcan_tests.kernel.processes import run_to_end
 
 TIMED_OUT = 124
 NO_STATUS = 125
@@ -41,6 +40,7 @@ def run_in_guest(
     *,
     systemd: bool = False,
     timeout_s: float | None = None,
+    show_kernel: bool = False,
     environment: Mapping[str, str] | None = None,
 ) -> Outcome:
     """Boots a guest, runs the command in the present folder, and halts the guest; its output goes to our stdout.
@@ -50,6 +50,7 @@ def run_in_guest(
         exchange: A new folder, which the guest sees as ``/run/guest``.
         systemd: Whether a real systemd is the guest's first process, and all writing goes into a RAM disk.
         timeout_s: Wall time until the guest is ended, in seconds.
+        show_kernel: Whether the kernel's own messages are shown: for a guest that dies.
         environment: Variables for the command beside the few that are passed on.
 
     Raises:
@@ -59,9 +60,10 @@ def run_in_guest(
     _furnish(exchange, kernel, "run_systemd.sh" if systemd else "run_plain.sh")
     _write_script(exchange / "command", command, environment or {})
     with _own_cpu() as cpu:
-        in_time = _boot(_command_line(kernel, exchange, cpu), timeout_s)
+        ended = run_to_end(_command_line(kernel, exchange, cpu, show_kernel), timeout_s)
     release = exchange / "kernel"
-    return Outcome(_status(exchange, in_time), release.read_text().strip() if release.exists() else "no kernel")
+    status = TIMED_OUT if ended is None else _status(exchange)
+    return Outcome(status, release.read_text().strip() if release.exists() else "that did not start")
 
 
 @contextmanager
@@ -90,14 +92,14 @@ def _write_script(script: Path, command: Sequence[str], environment: Mapping[str
     script.chmod(0o755)
 
 
-def _command_line(kernel: Kernel, exchange: Path, cpu: int) -> list[str]:
+def _command_line(kernel: Kernel, exchange: Path, cpu: int, show_kernel: bool) -> list[str]:
     """The guest's process. On one CPU it is 3 to 5 times as fast as on two; it ends when this process dies."""
     start = ["setpriv", "--pdeathsig", "TERM", "taskset", "-c", str(cpu)]
     if kernel.preload:
         start += ["env", f"LD_PRELOAD={kernel.preload}"]
     root = ["rootfstype=hostfs", "rootflags=/", "rw", f"init={exchange}/init", "lsm=yama"]
-    place = ["mem=1G", f"uml_dir={exchange}", "umid=uml"]
-    output = ["con=null", "con0=null,fd:1", "quiet", "loglevel=0"]
+    place = ["mem=2G", f"uml_dir={exchange}", "umid=uml"]
+    output = ["con=null", "con0=null,fd:1", *(["loglevel=7"] if show_kernel else ["quiet", "loglevel=0"])]
     return [*start, str(kernel.program), *root, *place, *output, "systemd.unit=guest.target"]
 
 
@@ -118,52 +120,6 @@ def _own_cpu() -> Iterator[int]:
     yield cpus[-1]
 
 
-def _boot(command_line: list[str], timeout_s: float | None) -> bool:
-    """Runs the guest to its end; whether it ended in time. Whatever happens, none of its processes is left.
-
-    The guest takes the terminal for its own if it gets one; a copying process between spares us that.
-    """
-    with subprocess.Popen(["cat"], stdin=subprocess.PIPE) as output, _ended_by_signals():
-        guest = subprocess.Popen(
-            command_line,
-            stdin=subprocess.DEVNULL,
-            stdout=output.stdin,
-            stderr=output.stdin,
-            start_new_session=True,
-        )
-        try:
-            guest.wait(timeout_s)
-        except subprocess.TimeoutExpired:
-            return False
-        finally:
-            _kill_all(guest)
-    return True
-
-
-def _kill_all(guest: subprocess.Popen[bytes]) -> None:
-    """The guest's helper threads outlive its main process when that is killed; the process group has them all."""
-    with suppress(ProcessLookupError):
-        os.killpg(guest.pid, signal.SIGKILL)
-    guest.wait()
-
-
-@contextmanager
-def _ended_by_signals() -> Iterator[None]:
-    """SIGTERM and SIGHUP end this process as Ctrl-C does: by an exception, so that it clears up."""
-
-    def end(number: int, _frame: object) -> None:
-        raise SystemExit(128 + number)
-
-    before = {number: signal.signal(number, end) for number in (signal.SIGTERM, signal.SIGHUP)}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-def _status(exchange: Path, in_time: bool) -> int:
-    if not in_time:
-        return TIMED_OUT
+def _status(exchange: Path) -> int:
     status = exchange / "status"
     return int(status.read_text()) if status.exists() else NO_STATUS

@@ -3,7 +3,7 @@
 insmod "$here/modules/fs/overlayfs/overlay.ko"
 
 # The new root: the host's files below, a RAM disk above.
-mount -t tmpfs tmpfs /mnt
+mount -t tmpfs -o size=75% tmpfs /mnt
 mkdir /mnt/upper /mnt/work /mnt/root
 mount -t overlay -o lowerdir=/,upperdir=/mnt/upper,workdir=/mnt/work overlay /mnt/root
 cd /mnt/root || exit

@@ -19,7 +19,6 @@ from types import TracebackType
 N_SLCAN = 17
 SIOCGIFNAME = 0x8910
 TIOCSETD = 0x5423
-SPEEDS = {10_000: "S0", 20_000: "S1", 50_000: "S2", 100_000: "S3", 125_000: "S4", 250_000: "S5", 500_000: "S6"}
 CAN_FRAME = struct.Struct("=IB3x8s")
 
 
@@ -28,7 +27,7 @@ class SlcanAdapter:
 
     Args:
         interface: The network interface that the kernel is to make of it.
-        bit_rate: In bit/s, one of ``SPEEDS``.
+        bit_rate: In bit/s, one of those that Lawicel's protocol has: 10_000 to 1_000_000.
         carries_to: A CAN interface that stands for what is wired to the adapter; frames go both ways.
 
     Attributes:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from xml.etree import ElementTree
 
 from vcan_tests.kernel import running
 from vcan_tests.kernel.guest import NO_STATUS, TIMED_OUT, exchange_folder, run_in_guest
+from vcan_tests.kernel.processes import run_to_end
 from vcan_tests.kernel.tools import MissingTool, require_tools
 
 MARKS = ("vcan", "systemd")
@@ -76,12 +76,8 @@ def run_here(mark: str, timeout_s: float, pytest_options: list[str]) -> Part:
     kernel = f"the running kernel {os.uname().release}"
     print(f"{mark} tests on {kernel}", flush=True)
     with exchange_folder() as exchange, running.buses_up():
-        try:
-            command = pytest_command(mark, exchange, pytest_options)
-            status = subprocess.run(command, timeout=timeout_s).returncode
-        except subprocess.TimeoutExpired:
-            status = TIMED_OUT
-        return part_of(mark, kernel, status, exchange)
+        ended = run_to_end(pytest_command(mark, exchange, pytest_options), timeout_s)
+        return part_of(mark, kernel, TIMED_OUT if ended is None else ended, exchange)
 
 
 def pytest_command(mark: str, exchange: Path, options: list[str]) -> list[str]:
