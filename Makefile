@@ -5,9 +5,12 @@ PYTHON ?= python3
 VENV := .venv
 PIP := $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check
 OUT ?= demo-out
+SERVICE_PYTHON ?= /usr/bin/python3
+PREFIX ?= /opt/canhelm
+PACKAGING = DESTDIR='$(DESTDIR)' PREFIX='$(PREFIX)' PYTHON='$(SERVICE_PYTHON)' PIP_PYTHON='$(VENV)/bin/python'
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test lint vcan-test
+.PHONY: help venv demo test lint vcan-test install uninstall deb
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST)
@@ -22,6 +25,15 @@ test: lint ## style, types, import rules, then all tests
 
 vcan-test: $(VENV)/.stamp-test ## the tests on a kernel's CAN bus and under a real systemd, both booted if need be
 	$(VENV)/bin/python -m vcan_tests.kernel.suite $(ARGS)
+
+install: | $(VENV)/bin/pip ## the service on this machine (as root): /opt/canhelm, units, users; see docs/service.md
+	$(PACKAGING) packaging/install.sh
+
+uninstall: ## take it away again; profiles, logs and state stay
+	$(PACKAGING) packaging/uninstall.sh
+
+deb: | $(VENV)/bin/pip ## the service as a Debian package, into dist/
+	$(PACKAGING) packaging/deb.sh
 
 lint: $(VENV)/.stamp-test ## style, types and import rules
 	$(VENV)/bin/ruff check .

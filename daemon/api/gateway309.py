@@ -57,16 +57,24 @@ class Gateway309:
         path: where to listen.
         tcp_port: port on the loopback interface to listen on as well, read-only; 0 for any free one, None for none.
         writable: clients of the Unix socket may write objects, command network states and use LSS.
+        inherited: a socket that listens at ``path`` already; whoever has opened it takes it away.
     """
 
     def __init__(
-        self, supervisor: Supervisor, path: Path, *, tcp_port: int | None = None, writable: bool = False
+        self,
+        supervisor: Supervisor,
+        path: Path,
+        *,
+        tcp_port: int | None = None,
+        writable: bool = False,
+        inherited: socket.socket | None = None,
     ) -> None:
         self.path = path
         self.tcp_port = tcp_port
         self.counters = Counters()
         self._supervisor = supervisor
         self._writable = writable
+        self._inherited = inherited
         self._listeners: list[socket.socket] = []
         self._servers: list[asyncio.Server] = []
         self._inode = 0
@@ -80,10 +88,14 @@ class Gateway309:
             ConfigError: the path or the port cannot be used.
             PermissionRefused: this user may not create the socket.
         """
-        unix = open_listener(self.path, "--gateway")
+        if self._inherited is not None:
+            unix = self._inherited.dup()
+        else:
+            unix = open_listener(self.path, "--gateway")
+            self._inode = os.stat(self.path).st_ino
         self._listeners.append(unix)
-        self._inode = os.stat(self.path).st_ino
-        self._servers.append(await asyncio.start_unix_server(self._on_unix, sock=unix, limit=MAX_LINE_BYTES))
+        # not start_unix_server: from Python 3.13 on that takes the path away, whoever owns it
+        self._servers.append(await asyncio.start_server(self._on_unix, sock=unix, limit=MAX_LINE_BYTES))
         if self.tcp_port is not None:
             tcp = _listen_on_loopback(self.tcp_port)
             self._listeners.append(tcp)

@@ -101,14 +101,16 @@ class Server:
     Args:
         backend: what carries the methods out.
         path: where to listen.
+        inherited: a socket that listens there already; whoever has opened it takes it away.
     """
 
-    def __init__(self, backend: Backend, path: Path) -> None:
+    def __init__(self, backend: Backend, path: Path, inherited: socket.socket | None = None) -> None:
         self.backend = backend
         self.path = path
         self.counters = Counters()
         self.connections: set[Connection] = set()
         self.tasks: set[asyncio.Task[None]] = set()
+        self._inherited = inherited
         self._listener: socket.socket | None = None
         self._server: asyncio.Server | None = None
         self._inode = 0
@@ -122,9 +124,13 @@ class Server:
             ConfigError: the path cannot be used.
             PermissionRefused: this user may not create it.
         """
-        self._listener = open_listener(self.path)
-        self._inode = os.stat(self.path).st_ino
-        self._server = await asyncio.get_running_loop().create_unix_server(self._accept, sock=self._listener)
+        if self._inherited is not None:
+            self._listener = self._inherited.dup()
+        else:
+            self._listener = open_listener(self.path)
+            self._inode = os.stat(self.path).st_ino
+        # not create_unix_server: from Python 3.13 on that takes the path away, whoever owns it
+        self._server = await asyncio.get_running_loop().create_server(self._accept, sock=self._listener)
         self.backend.events.append(self._on_event)
 
     async def close(self) -> None:
@@ -241,9 +247,9 @@ def _bind(path: Path) -> socket.socket:
 
 
 def remove_socket(path: Path, inode: int) -> None:
-    """Take a socket away, unless another one has taken its place since."""
+    """Take a socket away, unless another one has taken its place since, or it is not ours (``inode`` 0)."""
     try:
-        if os.stat(path).st_ino == inode:
+        if inode and os.stat(path).st_ino == inode:
             os.unlink(path)
     except FileNotFoundError:
         pass

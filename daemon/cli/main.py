@@ -53,6 +53,7 @@ COMMANDS: dict[Group, dict[str, str]] = {
     },
     SETUP: {
         "run": "daemon.cli.run:run",
+        "make-safe": "daemon.cli.make_safe:make_safe",
         "profile": "daemon.cli.profile:app",
         "version": "daemon.cli.version:version",
         "completion": "daemon.cli.completion:completion",

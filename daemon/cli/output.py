@@ -7,11 +7,14 @@ from __future__ import annotations
 
 import json as json_text
 import math
+import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
+
+from daemon.cli import journal
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -85,13 +88,26 @@ def console(stderr: bool = False) -> Console:
     return Console(stderr=stderr, highlight=False)
 
 
-def say(text: str) -> None:
-    """A sentence for people, on stderr."""
-    print(f"canhelm: {text}", file=sys.stderr, flush=True)
+def say(text: str, level: int = journal.INFO) -> None:
+    """A sentence for people, on stderr.
+
+    Args:
+        text: the sentence.
+        level: how the journal shall take it, where stderr goes there.
+    """
+    told = f"canhelm: {text}"
+    if journal.reads_stderr(os.environ):
+        told = journal.with_level(told, level)
+    print(told, file=sys.stderr, flush=True)
+
+
+def say_warning(text: str) -> None:
+    """What a person should look at although the command goes on, on stderr."""
+    say(text, journal.WARNING)
 
 
 def say_error(error: CanhelmError) -> None:
     """What went wrong, the limit that it broke, and what to do next, on stderr."""
     limit = "" if error.limit is None or str(error.limit) in error.message else f" (limit: {error.limit})"
     remedy = f" - {error.remedy}" if error.remedy else ""
-    say(f"{error.message}{limit}{remedy}")
+    say(f"{error.message}{limit}{remedy}", journal.ERROR)

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import asyncio
-import logging
+import faulthandler
+import os
 import signal
 import sys
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from canhelm import protocol
 from canhelm.errors import ConfigError, UsageError
+from daemon.cli import journal
 from daemon.cli.output import say
+
+if TYPE_CHECKING:
+    from profiles.schema import Profile
 
 
 def run(
@@ -53,7 +58,10 @@ def run(
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _end_before_it_began)
     from daemon.app import App, GatewayAccess
+    from daemon.life import Life
+    from daemon.runtime.activation import inherited_sockets
     from daemon.runtime.clock import run_precise
+    from daemon.runtime.notify import ServiceManager
     from profiles.loader import load
 
     chosen = _bus(bus, simulate=simulate)
@@ -75,25 +83,40 @@ def run(
     loaded = load(profile)
     for given in (socket, gateway):
         _require_folder(given)
-    path = socket or Path(protocol.default_socket(loaded.profile.name))
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s %(message)s")
+    journal.log_to_stderr(os.environ)
+    faulthandler.enable()  # a watchdog ends a hung daemon by SIGABRT: tell where it hangs
+    inherited = inherited_sockets(os.environ, os.getpid())
+    path = socket or _api_socket(inherited) or Path(protocol.default_socket(loaded.profile.name))
     access = GatewayAccess(gateway or path.with_suffix(protocol.GATEWAY_SUFFIX), gateway_tcp, gateway_write)
 
-    async def serve() -> str:
-        app = App(
-            loaded.profile,
+    def make_app(robot: Profile) -> App:
+        return App(
+            robot,
             chosen,
             socket=path,
             record=Path(record) if record else None,
             seed=seed,
             powered=not unpowered,
             gateway=access,
+            inherited=inherited,
         )
-        return await app.run()
+
+    async def load_anew() -> Profile:
+        return (await asyncio.to_thread(load, profile)).profile
+
+    async def serve() -> str:
+        life = Life(make_app, load_anew, ServiceManager.of(os.environ, os.getpid()))
+        life.take_signals()
+        return await life.run(loaded.profile)
 
     runner: Callable[[Coroutine[Any, Any, str]], str] = run_precise if simulates(chosen) else asyncio.run
     say(runner(serve()))
     return 0
+
+
+def _api_socket(inherited: Iterable[Path]) -> Path | None:
+    """Which of the sockets that listen already is the API's."""
+    return next((path for path in inherited if not path.name.endswith(protocol.GATEWAY_SUFFIX)), None)
 
 
 def _end_before_it_began(number: int, _: object) -> None:

@@ -47,6 +47,11 @@ class Service:
         return self._supervisor.state.value
 
     @property
+    def sentence(self) -> str:
+        """How the vehicle is, in one short line."""
+        return self._supervisor.sentence
+
+    @property
     def lease_timeout_s(self) -> float:
         """How long a motion goes on without a renewal."""
         return self._supervisor.lease_timeout_s

@@ -15,18 +15,33 @@ import pytest
 from canhelm.errors import ConfigError
 from daemon.app import App
 from daemon.cli.main import main
+from daemon.life import Life
+from daemon.runtime.notify import ServiceManager
 from profiles.loader import load
+from profiles.schema import Profile
 from vcan_tests.robot import Robot
 
 SIMULATED = ("run", "--simulate", "--profile", "max2d")
 
 
+async def _begin(socket: Path) -> asyncio.Task[str]:
+    """A daemon that runs as in a terminal, after its first cycle."""
+
+    async def load_anew() -> Profile:
+        return load("max2d").profile
+
+    life = Life(lambda profile: App(profile, socket=socket, powered=False), load_anew, ServiceManager())
+    life.take_signals()
+    running = asyncio.create_task(life.run(load("max2d").profile))
+    await asyncio.sleep(0)
+    await Robot(life.app).until(lambda: life.app.cycle.counters.cycles > 0)
+    return running
+
+
 @pytest.mark.real_time
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 async def test_a_signal_ends_the_daemon_in_order(number: signal.Signals, tmp_path: Path) -> None:
-    app = App(load("max2d").profile, socket=tmp_path / "robot.sock", powered=False)
-    running = asyncio.create_task(app.run())
-    await Robot(app).until(lambda: app.cycle.counters.cycles > 0)
+    running = await _begin(tmp_path / "robot.sock")
     os.kill(os.getpid(), number)
     await asyncio.wait_for(running, 5.0)
     assert not (tmp_path / "robot.sock").exists()
@@ -35,9 +50,7 @@ async def test_a_signal_ends_the_daemon_in_order(number: signal.Signals, tmp_pat
 @pytest.mark.real_time
 async def test_a_hang_up_that_is_ignored_stays_ignored(tmp_path: Path) -> None:
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    app = App(load("max2d").profile, socket=tmp_path / "robot.sock", powered=False)
-    running = asyncio.create_task(app.run())
-    await Robot(app).until(lambda: app.cycle.counters.cycles > 0)
+    running = await _begin(tmp_path / "robot.sock")
     os.kill(os.getpid(), signal.SIGHUP)
     await asyncio.sleep(0.05)
     assert not running.done()

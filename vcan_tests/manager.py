@@ -1,0 +1,34 @@
+"""A service manager for tests: the other end of the notification socket."""
+
+from __future__ import annotations
+
+import os
+import socket
+from pathlib import Path
+
+
+class Manager:
+    """The service manager's end of the socket."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._socket.bind(os.fspath(path))
+        self._socket.setblocking(False)
+
+    def heard(self) -> list[list[str]]:
+        """The lines of each message since the last call."""
+        messages = []
+        while True:
+            try:
+                messages.append(self._socket.recv(4096).decode().split("\n"))
+            except BlockingIOError:
+                return messages
+
+    def fed(self) -> int:
+        """How often the watchdog was fed since the last call."""
+        return sum("WATCHDOG=1" in message for message in self.heard())
+
+    def close(self) -> None:
+        """Listen no more."""
+        self._socket.close()
