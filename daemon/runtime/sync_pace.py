@@ -23,7 +23,7 @@ LOGGER = logging.getLogger("canhelm.bus")
 
 AHEAD_S = 0.25
 """How long SYNC goes on without a cycle: a longer pause than a loaded machine makes, less than a node's life time."""
-PATIENCE = 1.5
+PATIENCE = 2.5
 """Periods without a SYNC after which the timer ticks."""
 
 
