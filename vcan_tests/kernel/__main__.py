@@ -15,10 +15,11 @@ def main() -> int:
     parser.add_argument("--systemd", action="store_true", help="boot a real systemd; writing goes into a RAM disk")
     parser.add_argument("--timeout", type=float, metavar="S", help="end the guest after so many seconds")
     parser.add_argument("--show-kernel", action="store_true", help="show the kernel's own messages")
-    parser.add_argument("--env", action="append", default=[], metavar="K=V", help="a variable for the command")
+    parser.add_argument(
+        "--env", action="append", default=[], metavar="K=V", type=variable, help="a variable for the command"
+    )
     parser.add_argument("command", nargs="+", metavar="CMD ARG...")
     asked = parser.parse_args()
-    environment = dict(pair.split("=", 1) for pair in asked.env)
     try:
         require_tools()
         with exchange_folder() as exchange:
@@ -28,7 +29,7 @@ def main() -> int:
                 systemd=asked.systemd,
                 timeout_s=asked.timeout,
                 show_kernel=asked.show_kernel,
-                environment=environment,
+                environment=dict(asked.env),
             )
     except MissingTool as error:
         print(f"no guest: {error}", file=sys.stderr)
@@ -38,6 +39,14 @@ def main() -> int:
     if outcome.status == NO_STATUS:
         print("the guest died before its command ended; --show-kernel tells more", file=sys.stderr)
     return outcome.status
+
+
+def variable(text: str) -> tuple[str, str]:
+    """Name and value from ``K=V``."""
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise argparse.ArgumentTypeError(f"{text}: want K=V")
+    return name, value
 
 
 if __name__ == "__main__":
