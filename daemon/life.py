@@ -99,7 +99,9 @@ class Life:
         if self._ending:
             raise Refused("the daemon is going down", remedy="start it again")
         if state not in AT_REST:
-            raise Refused(f"the vehicle's state is {state}", remedy="`canhelm stop`, `canhelm reset`, drives off, then reload")
+            raise Refused(
+                f"the vehicle's state is {state}", remedy="at rest, switched off and without a fault it works"
+            )
 
     def take_signals(self) -> None:
         """From now on SIGTERM and SIGINT end it, and SIGHUP is :meth:`hang_up`."""

@@ -10,7 +10,7 @@ from daemon.cli.output import say, say_error, say_warning
 
 if TYPE_CHECKING:
     from drivers.canopen.master import Master
-    from profiles.schema import DriveConfig, Profile
+    from profiles.schema import Profile
 
 LONGEST_S = 8.0
 """What is not done by then is left."""
@@ -62,7 +62,7 @@ async def _on_bus(profile: Profile, spec: str) -> int:
 
 
 async def secure(master: Master, profile: Profile) -> int:
-    """Make every drive of a profile safe, all at once.
+    """Stop every drive of a profile, and switch them off when all are at rest.
 
     Args:
         master: of their bus, started.
@@ -71,20 +71,47 @@ async def secure(master: Master, profile: Profile) -> int:
     Returns:
         The exit code: 0 where each drive that answers is safe now.
     """
-    names = tuple(profile.drives)
-    found = await asyncio.gather(*(_secure(master, profile, name) for name in names), return_exceptions=True)
-    failures = [error for error in found if error is not None]
-    for error in failures:
-        if not isinstance(error, CanhelmError):
-            raise error
-        say_warning(str(error)) if isinstance(error, NodeAbsent) else say_error(error)
-    say(f"{len(names) - len(failures)} of {len(names)} drives are at rest and off, their brakes engaged")
-    return int(not all(isinstance(error, NodeAbsent) for error in failures))
+    drives = [_Left(master, profile, name) for name in profile.drives]
+    await asyncio.gather(*(drive.stop() for drive in drives))
+    await asyncio.sleep(max(drive.ramp_s for drive in drives))
+    await asyncio.gather(*(drive.switch_off() for drive in drives))
+    safe = [drive for drive in drives if drive.failure is None]
+    for drive in drives:
+        if isinstance(drive.failure, NodeAbsent):
+            say_warning(str(drive.failure))
+        elif drive.failure is not None:
+            say_error(drive.failure)
+    say(f"{len(safe)} of {len(drives)} drives are stopped and off, their brakes engaged")
+    return int(any(drive.failure and not isinstance(drive.failure, NodeAbsent) for drive in drives))
 
 
-async def _secure(master: Master, profile: Profile, name: str) -> None:
-    from drivers.epos.make_safe import make_safe as make_drive_safe
+class _Left:
+    """A drive that was left behind; what fails first ends the work on it."""
 
-    config: DriveConfig = profile.drives[name]
-    brakes = [brake for brake in profile.brakes.values() if brake.drive == name]
-    await make_drive_safe(master.sdo(config.node), config, brakes, f"node {config.node} ({name})")
+    def __init__(self, master: Master, profile: Profile, name: str) -> None:
+        self.failure: CanhelmError | None = None
+        self.ramp_s = 0.0
+        self._config = profile.drives[name]
+        self._brakes = [brake for brake in profile.brakes.values() if brake.drive == name]
+        self._who = f"node {self._config.node} ({name})"
+        master.names[self._config.node] = name
+        self._sdo = master.sdo(self._config.node)
+
+    async def stop(self) -> None:
+        from drivers.epos import make_safe
+
+        try:
+            self.ramp_s = await make_safe.stop(self._sdo, self._config, self._brakes)
+        except CanhelmError as error:
+            self.failure = error
+
+    async def switch_off(self) -> None:
+        from drivers.epos import make_safe
+
+        try:
+            if self.failure is None:
+                speed_m_s = await make_safe.switch_off(self._sdo, self._config, self._brakes, self._who)
+                if speed_m_s > make_safe.AT_REST_M_S:
+                    say_warning(f"{self._who} rolls on at {speed_m_s:.2f} m/s without torque")
+        except CanhelmError as error:
+            self.failure = error

@@ -12,49 +12,59 @@ from collections.abc import Sequence
 from canhelm.errors import DeviceFault
 from drivers.canopen.sdo import SdoClient
 from drivers.epos.objects import OBJECTS
-from drivers.epos.state_machine import Command, State, state_of
+from drivers.epos.state_machine import Command, state_of
 from drivers.epos.units import WheelUnits
 from profiles.schema import BrakeConfig, DriveConfig
 
-SETTLING_S = 0.1
-"""Time that a motor is given beyond its ramp."""
+SETTLING_S = 0.3
+"""Time that wheels and body are given beyond the ramp."""
 AT_REST_M_S = 0.01
 
 _CONTROLWORD, _STATUSWORD = OBJECTS["controlword"], OBJECTS["statusword"]
 _OUTPUTS, _OUTPUT_MASK = OBJECTS["digital_output_functions_state"], OBJECTS["digital_output_functions_mask"]
 
 
-async def make_safe(sdo: SdoClient, config: DriveConfig, brakes: Sequence[BrakeConfig], who: str) -> None:
-    """Quick stop, steering brakes; at rest: holding brakes, power off. Changes nothing where all of it is so already.
+async def stop(sdo: SdoClient, config: DriveConfig, brakes: Sequence[BrakeConfig]) -> float:
+    """Quick stop, steering brakes; nothing changes where the drive stands and they are engaged.
 
     Args:
         sdo: the drive's client.
         config: the drive.
         brakes: those on its outputs.
-        who: the drive for people.
+
+    Returns:
+        Time that its motor needs to come to rest [s].
 
     Raises:
         NodeAbsent, Timeout, Aborted: it does not answer, or refuses.
-        DeviceFault: it is not safe in spite of everything.
     """
     await sdo.write(_CONTROLWORD, int(Command.QUICK_STOP))
     await _engage(sdo, [brake for brake in brakes if brake.kind == "steering"])
     speed_m_s = await _speed_m_s(sdo, config)
-    if speed_m_s > AT_REST_M_S and await _state(sdo) is not State.FAULT:
-        await asyncio.sleep(speed_m_s / config.quick_stop_m_s2 + SETTLING_S)
-        speed_m_s = await _speed_m_s(sdo, config)
+    return speed_m_s / config.quick_stop_m_s2 + SETTLING_S if speed_m_s > AT_REST_M_S else 0.0
+
+
+async def switch_off(sdo: SdoClient, config: DriveConfig, brakes: Sequence[BrakeConfig], who: str) -> float:
+    """Holding brakes, power off, and no guarding of a master that is not there any more.
+
+    Args:
+        sdo, config, brakes: as for :func:`stop`.
+        who: the drive for people.
+
+    Returns:
+        Speed at which its wheel rolls on without torque [m/s].
+
+    Raises:
+        NodeAbsent, Timeout, Aborted: it does not answer, or refuses.
+        DeviceFault: its power stage stays on.
+    """
     await _engage(sdo, [brake for brake in brakes if brake.kind == "holding"])
     await sdo.write(_CONTROLWORD, int(Command.DISABLE_VOLTAGE))
-    state = await _state(sdo)
+    state = state_of(await sdo.read_int(_STATUSWORD))
     if state is None or state.power_stage_on:
         raise DeviceFault(f"{who} does not switch off", node=sdo.node, remedy="take its motor power away")
     await sdo.write(OBJECTS["life_time_factor"], 0)
-    if speed_m_s > AT_REST_M_S:
-        raise DeviceFault(f"{who} is off and still turns at {speed_m_s:.2f} m/s", node=sdo.node, remedy="hold it")
-
-
-async def _state(sdo: SdoClient) -> State | None:
-    return state_of(await sdo.read_int(_STATUSWORD))
+    return await _speed_m_s(sdo, config)
 
 
 async def _speed_m_s(sdo: SdoClient, config: DriveConfig) -> float:

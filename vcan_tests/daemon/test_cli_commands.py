@@ -292,7 +292,7 @@ def test_an_interruption_while_the_command_is_loaded_is_no_traceback(capsys: pyt
 
 NOUNS = ("motor", "brake", "drive", "nmt", "sdo", "sim")
 WITH_EXAMPLES = {" ".join(line.split()[: 1 + (line.split()[0] in NOUNS)]) for line, _, _ in SENT}
-WITH_EXAMPLES |= {"status", "monitor", "doctor", "version", "completion", "explain", "run", "demo"}
+WITH_EXAMPLES |= {"status", "monitor", "doctor", "version", "completion", "explain", "run", "make-safe", "demo"}
 
 
 @pytest.mark.parametrize("command", sorted(WITH_EXAMPLES))
