@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping
+import contextlib
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import pytest
 
 from daemon.runtime.clock import VirtualTimeLoop
+from vcan_tests.awake import awake_processors
 
 NEEDS = {
     "vcan": [Path("/sys/class/net/vcan0"), Path("/sys/class/net/vcan1")],
@@ -28,6 +30,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.get_closest_marker("real_time") or "bench" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.flaky(reruns=2))
+
+
+@pytest.fixture(autouse=True)
+def _awake(request: pytest.FixtureRequest) -> Iterator[None]:
+    """A test in real time is not to wait for a sleeping processor."""
+    real = request.node.get_closest_marker("real_time") or "bench" in request.fixturenames
+    with awake_processors() if real else contextlib.nullcontext():
+        yield
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -29,6 +29,8 @@ IFF_UP = 1
 WANTED_QUEUE = 100
 """Frames; the kernel's default of 10 is less than one control cycle of a robot sends."""
 LATE_SHARE = 0.001
+SLOW_LINE = 0.8
+"""Share of its planned rate below which a serial line is slow."""
 OLDEST_PYTHON = (3, 11)
 STYLES = {"ok": "green", "note": "yellow", "problem": "red"}
 
@@ -248,10 +250,17 @@ def _line_findings(bus: Mapping[str, Any], cycle: Mapping[str, Any]) -> Iterator
         return
     at = ", ".join(f"{hz} at {baud} baud" for baud, hz in bus["planned_hz_at_baud"].items())
     rate = f"{cycle.get('achieved_hz')} cycles a second at {bus['baud']} baud, planned {bus['planned_hz']} ({at})"
+    if cycle.get("achieved_hz", 0.0) < SLOW_LINE * bus["planned_hz"]:
+        remedy = "free this machine; a USB adapter needs its latency timer at 1 ms (setserial DEVICE low_latency)"
+        yield Finding(
+            "line rate", "problem", f"{rate}: the limits of the vehicle are made for the planned rate", remedy
+        )
     if bus.get("silent_nodes"):
         nodes = ", ".join(map(str, bus["silent_nodes"]))
         yield Finding("serial line", "problem", f"{rate}; silent nodes: {nodes}", "switch their power on")
     else:
         yield Finding("serial line", "ok", f"{rate}; resynchronised {bus['resyncs']} times")
     stop = f"at full speed the wheels rest {bus['silent_line_stop_s']} s and {bus['silent_line_stop_m']} m after it"
+    if bus.get("silent_line_turn_deg") is not None:
+        stop += f", a pair that is being turned {bus['silent_line_turn_deg']} degrees"
     yield Finding("pulled cable", "note", stop, f"the speed limit is {bus['speed_limit_m_s']} m/s; see docs/rs232.md")

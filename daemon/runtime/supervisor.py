@@ -58,8 +58,7 @@ class Supervisor:
         self._stale_s = master.network.late_after_cycles * period_s
         self._numbers = itertools.count(1)
         self._tasks = TaskSet(self._on_task_failure)
-        network = master.network
-        self._watch = DeviceWatch(devices, period_s, network.patience_s, network.late_after_cycles)
+        self._watch = DeviceWatch(devices, period_s, master.network.late_after_cycles)
         self._stopping = stopping = Stopping(devices, vehicle, self.motions, self._tasks, self.log, self._drop_targets)
         self.stop, self.estop, self.fault = stopping.stop, stopping.estop, stopping.fault
         self.power_off, self.until_rest = stopping.power_off, stopping.until_rest

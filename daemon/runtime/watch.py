@@ -12,8 +12,8 @@ from drivers.devices import Devices
 SILENT_CYCLES = 5
 """Control cycles without a reading after which a node counts as silent while something moves.
 
-Cycles count, not time: while the daemon itself stands still nobody asks. A pause that is too long for the drives is
-theirs to notice, by life guarding."""
+Cycles count, not time: while the daemon itself stands still nobody asks, and while a request to a dead node keeps a
+serial line there are few of them. A pause that is too long for the drives is theirs to notice, by life guarding."""
 LATE_CYCLES = 2
 """Cycles between two looks from which on the daemon itself counts as late."""
 
@@ -24,18 +24,14 @@ class DeviceWatch:
     Args:
         devices: all devices.
         period_s: the control cycle's period.
-        patience_s: see ``Network.patience_s``.
         late_after_cycles: see ``Network.late_after_cycles``.
     """
 
-    def __init__(
-        self, devices: Devices, period_s: float, patience_s: float = 0.0, late_after_cycles: float = 1.0
-    ) -> None:
+    def __init__(self, devices: Devices, period_s: float, late_after_cycles: float = 1.0) -> None:
         self._devices = tuple(devices.by_node.values())
         self._by_node = devices.by_node
         self._period_s = period_s
-        self._late_s = (late_after_cycles + LATE_CYCLES - 1) * period_s
-        self._silent_cycles = max(SILENT_CYCLES, math.ceil(patience_s / period_s))
+        self._late_s = LATE_CYCLES * late_after_cycles * period_s
         self._unread: dict[int, tuple[float, int]] = {}
         self._looked_s: float | None = None
         self._stall_end_s = -math.inf
@@ -56,8 +52,8 @@ class DeviceWatch:
             fault = device.fault
             if fault is not None and (powered or fault.code != 0):
                 return DeviceFault(fault.message, node=fault.node, value=fault.code or None, remedy=fault.remedy)
-            if self._cycles_unread(device) > self._silent_cycles and powered and device.node_state is NodeState.READY:
-                return self._silence(device, f"{device.who} is silent", now_s, "check its power and the CAN cable")
+            if self._cycles_unread(device) > SILENT_CYCLES and powered and device.node_state is NodeState.READY:
+                return self._silence(device, *self._who_is_silent(device), now_s)
         return None
 
     def _cycles_unread(self, device: Device) -> int:
@@ -67,14 +63,20 @@ class DeviceWatch:
         self._unread[device.node] = (device.reading_time_s, cycles)
         return cycles
 
+    def _who_is_silent(self, device: Device) -> tuple[str, str]:
+        """What is silent, and what to do: this node, or all of them."""
+        if all(cycles >= SILENT_CYCLES for _, cycles in self._unread.values()):
+            return "no node answers", "check the cable to the robot, and its power"
+        return f"{device.who} is silent", "check its power and the CAN cable"
+
     def lost(self, event: NodeEvent) -> DeviceFault | None:
         """The fault that an event about a node means for a vehicle that is powered, or None."""
         device = self._by_node.get(event.node)
         if event.kind not in ("lost", "rebooted") or device is None:
             return None
-        return self._silence(device, event.message, event.time_s, event.remedy)
+        return self._silence(device, event.message, event.remedy, event.time_s)
 
-    def _silence(self, device: Device, what: str, now_s: float, remedy: str) -> DeviceFault:
+    def _silence(self, device: Device, what: str, remedy: str, now_s: float) -> DeviceFault:
         """The fault; it tells where the daemon was late itself since the last reading, as then nobody listened."""
         what = f"{what}; stop commanded {(now_s - device.reading_time_s) * 1e3:.0f} ms after its last reading"
         if self._stall_end_s >= device.reading_time_s:

@@ -39,6 +39,10 @@ LIFE_TIME_FACTOR = 2
 """A broken conversation costs the line half a second; a vehicle that moves is then stopped anyway."""
 LATE_AFTER_CYCLES = 3.0
 """A line may be slower than planned."""
+COASTING_S = 0.5
+COASTING_M = 0.02
+"""A drive switches off when its ramp ends; a vehicle that lags behind it swings to rest in this time and way, as seen
+in the simulation."""
 REACTION_CYCLES_CAN = 2
 REACTION_CYCLES_SERIAL = 3
 """Cycles from something that happens to the wheels' answer: read, decide, written behind others."""
@@ -158,21 +162,30 @@ def serial_limits(limits: Limits, deceleration_m_s2: float, can_cycle_s: float, 
 
 
 def stopping_time_s(profile: Profile, speed_m_s: float) -> float:
-    """Time from a line that falls silent to wheels at rest: guarding runs out, then the quick-stop ramp [s].
+    """Time from a line that falls silent to wheels at rest: guarding runs out, the quick-stop ramp, coasting [s].
 
     Args:
         profile: as :func:`serial_profile` makes it.
         speed_m_s: rim speed of the fastest wheel.
     """
     life_s = profile.network.guard_time_ms * profile.network.life_time_factor / 1e3
-    return life_s + abs(speed_m_s) / min(drive.quick_stop_m_s2 for drive in profile.drives.values())
+    ramp_s = abs(speed_m_s) / min(drive.quick_stop_m_s2 for drive in profile.drives.values())
+    return life_s + ramp_s + COASTING_S
 
 
 def stopping_way_m(profile: Profile, speed_m_s: float) -> float:
     """The way that a wheel rolls in that time [m]."""
     life_s = profile.network.guard_time_ms * profile.network.life_time_factor / 1e3
     ramp = min(drive.quick_stop_m_s2 for drive in profile.drives.values())
-    return abs(speed_m_s) * life_s + speed_m_s**2 / (2.0 * ramp)
+    return abs(speed_m_s) * life_s + speed_m_s**2 / (2.0 * ramp) + COASTING_M
+
+
+def stopping_turn_rad(profile: Profile) -> float | None:
+    """By how much a pair that is being turned turns on in that time [rad]; None for a robot without such pairs."""
+    if profile.vehicle is None:
+        return None
+    way_m = stopping_way_m(profile, profile.limits.steering_rim_speed_m_s)
+    return way_m / profile.vehicle.contact_offset_m if profile.vehicle.contact_offset_m else math.pi
 
 
 def facts(profile: Profile, baud: int) -> dict[str, Any]:
@@ -183,11 +196,12 @@ def facts(profile: Profile, baud: int) -> dict[str, Any]:
         baud: of the line.
     """
     shrunk = serial_profile(profile, baud)
-    top = shrunk.limits.wheel_speed_m_s
+    top, turn_rad = shrunk.limits.wheel_speed_m_s, stopping_turn_rad(shrunk)
     return {
         "planned_hz": round(shrunk.network.cycle_hz, 1),
         "planned_hz_at_baud": {str(rate): round(plan(profile, rate).cycle_hz, 1) for rate in (115200, 38400)},
         "speed_limit_m_s": shrunk.limits.speed_m_s,
         "silent_line_stop_s": round(stopping_time_s(shrunk, top), 2),
         "silent_line_stop_m": round(stopping_way_m(shrunk, top), 2),
+        "silent_line_turn_deg": None if turn_rad is None else round(math.degrees(turn_rad)),
     }

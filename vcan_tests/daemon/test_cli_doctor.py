@@ -121,7 +121,8 @@ def test_a_socket_on_which_nobody_answers_is_a_problem(capsys: pytest.CaptureFix
 
 LINE = {
     "baud": 115200, "planned_hz": 16.1, "planned_hz_at_baud": {"115200": 16.1, "38400": 7.5}, "speed_limit_m_s": 0.9,
-    "silent_line_stop_s": 1.4, "silent_line_stop_m": 1.5, "resyncs": 0, "silent_nodes": [], "line_down": None,
+    "silent_line_stop_s": 1.4, "silent_line_stop_m": 1.5, "silent_line_turn_deg": 63,
+    "resyncs": 0, "silent_nodes": [], "line_down": None,
 }  # fmt: skip
 
 
@@ -130,7 +131,13 @@ def test_a_serial_line_is_told_with_its_rates_and_with_what_a_pulled_cable_means
     assert found["serial line"].verdict == "ok"
     assert "19.5 cycles a second" in found["serial line"].finding
     assert "7.5 at 38400 baud" in found["serial line"].finding
-    assert "1.4 s and 1.5 m" in found["pulled cable"].finding
+    assert "1.4 s and 1.5 m after it, a pair that is being turned 63 degrees" in found["pulled cable"].finding
+
+
+def test_a_line_that_is_slower_than_planned_is_a_problem() -> None:
+    found = findings(bus=LINE, cycle={"achieved_hz": 9.0})
+    assert found["line rate"].verdict == "problem"
+    assert "latency timer" in found["line rate"].mend
 
 
 def test_a_node_that_is_silent_on_a_serial_line_is_a_problem() -> None:

@@ -37,12 +37,12 @@ class Bench:
         log: what it wrote to stderr.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, bus: str = "simulated") -> None:
         self.socket = folder / "robot.sock"
         self.log = folder / "daemon.log"
         profile = folder / "max2d.yaml"
         profile.write_text(PATIENT_PROFILE)
-        arguments = ("run", "--simulate", "--profile", str(profile), "--socket", str(self.socket))
+        arguments = ("run", "--bus", bus, "--profile", str(profile), "--socket", str(self.socket))
         with self.log.open("w") as log:
             self.process = subprocess.Popen([sys.executable, "-m", "daemon", *arguments], stderr=log, stdout=log)
         try:
@@ -103,6 +103,47 @@ def speeds(status: dict[str, Any]) -> list[float]:
 
 def at_rest(status: dict[str, Any]) -> bool:
     return max(speeds(status)) < 0.01
+
+
+SEQUENCE = (
+    ("motor enable 2", 0),
+    ("motor velocity 2 150 --duration 1", 0),
+    ("motor velocity 1 -150 --duration 1", 0),
+    ("motor disable 2", 0),
+    ("brake release front", 0),
+    ("motor velocity 3 100 --duration 1", 6),
+    ("brake engage front", 0),
+    ("steer front 15", 0),
+    ("steer rear -15", 0),
+    ("steer front 88", 1),
+    ("drive turn --rear -15 --front 15 --speed 0.3 --duration 1", 0),
+    ("drive parallel --angle 0 --speed 9 --duration 1", 1),
+    ("motor velocity 77 100 --duration 1", 4),
+    ("estop", 0),
+    ("steer front 0", 6),
+    ("reset", 0),
+    ("steer front 0", 0),
+)
+"""What a person types, and the exit codes."""
+
+
+@pytest.mark.real_time
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("bus", ["simulated", "rs232"])
+def test_the_same_commands_end_alike_over_can_and_over_a_serial_line(bus: str, tmp_path: Path) -> None:
+    bench = Bench(tmp_path, bus)
+    try:
+        for typed, code in SEQUENCE:
+            done = bench.canhelm(*typed.split())
+            assert (typed, done.returncode) == (typed, code), done.stderr
+        status = bench.wait_for(lambda status: status["state"] == "idle")
+        assert [brake["state"] for brake in status["brakes"]] == ["engaged", "engaged"]
+        assert status["vehicle"]["heading_deg"]["front"] == pytest.approx(0.0, abs=1.0)
+        assert status["vehicle"]["heading_deg"]["rear"] == pytest.approx(-15.0, abs=1.0)
+    finally:
+        bench.client.close()
+        bench.process.send_signal(signal.SIGTERM)
+        assert bench.process.wait(TIMEOUT_S) == 0
 
 
 @pytest.fixture(scope="module")
