@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from canhelm.errors import DeviceFault
+from drivers.canopen.device import CanopenDevice
 from drivers.canopen.master import NodeEvent
 from drivers.contract import Device, NodeState
 from drivers.devices import Devices
@@ -63,7 +64,7 @@ class DeviceWatch:
         self._unread[device.node] = (device.reading_time_s, cycles)
         return cycles
 
-    def _who_is_silent(self, device: Device) -> tuple[str, str]:
+    def _who_is_silent(self, device: CanopenDevice) -> tuple[str, str]:
         """What is silent, and what to do: this node, or all of them."""
         if all(cycles >= SILENT_CYCLES for _, cycles in self._unread.values()):
             return "no node answers", "check the cable to the robot, and its power"
