@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from drivers.canopen.master import Master
     from profiles.schema import Profile
 
+SETTLING_S = 0.3
+"""Time that wheels and body are given beyond the longest ramp."""
 LONGEST_S = 8.0
 """What is not done by then is left."""
 
@@ -73,7 +75,8 @@ async def secure(master: Master, profile: Profile) -> int:
     """
     drives = [_Left(master, profile, name) for name in profile.drives]
     await asyncio.gather(*(drive.stop() for drive in drives))
-    await asyncio.sleep(max(drive.ramp_s for drive in drives))
+    ramp_s = max(drive.ramp_s for drive in drives)
+    await asyncio.sleep(ramp_s + SETTLING_S if ramp_s else 0.0)
     await asyncio.gather(*(drive.switch_off() for drive in drives))
     safe = [drive for drive in drives if drive.failure is None]
     for drive in drives:
@@ -110,7 +113,7 @@ class _Left:
 
         try:
             if self.failure is None:
-                speed_m_s = await make_safe.switch_off(self._sdo, self._config, self._brakes, self._who)
+                speed_m_s = await make_safe.switch_off(self._sdo, self._config, self._who)
                 if speed_m_s > make_safe.AT_REST_M_S:
                     say_warning(f"{self._who} rolls on at {speed_m_s:.2f} m/s without torque")
         except CanhelmError as error:

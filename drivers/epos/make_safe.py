@@ -16,8 +16,6 @@ from drivers.epos.state_machine import Command, state_of
 from drivers.epos.units import WheelUnits
 from profiles.schema import BrakeConfig, DriveConfig
 
-SETTLING_S = 0.3
-"""Time that wheels and body are given beyond the ramp."""
 AT_REST_M_S = 0.01
 
 _CONTROLWORD, _STATUSWORD = OBJECTS["controlword"], OBJECTS["statusword"]
@@ -25,7 +23,9 @@ _OUTPUTS, _OUTPUT_MASK = OBJECTS["digital_output_functions_state"], OBJECTS["dig
 
 
 async def stop(sdo: SdoClient, config: DriveConfig, brakes: Sequence[BrakeConfig]) -> float:
-    """Quick stop, steering brakes; nothing changes where the drive stands and they are engaged.
+    """Quick stop, steering brakes at once, holding brakes at rest; one without torque does not wait for that.
+
+    Nothing changes where the drive stands and its brakes are engaged.
 
     Args:
         sdo: the drive's client.
@@ -33,22 +33,27 @@ async def stop(sdo: SdoClient, config: DriveConfig, brakes: Sequence[BrakeConfig
         brakes: those on its outputs.
 
     Returns:
-        Time that its motor needs to come to rest [s].
+        Time that its ramp still takes [s].
 
     Raises:
         NodeAbsent, Timeout, Aborted: it does not answer, or refuses.
     """
     await sdo.write(_CONTROLWORD, int(Command.QUICK_STOP))
     await _engage(sdo, [brake for brake in brakes if brake.kind == "steering"])
-    speed_m_s = await _speed_m_s(sdo, config)
-    return speed_m_s / config.quick_stop_m_s2 + SETTLING_S if speed_m_s > AT_REST_M_S else 0.0
+    ramp_s = await _speed_m_s(sdo, config) / config.quick_stop_m_s2 if await _has_torque(sdo) else 0.0
+    holding = [brake for brake in brakes if brake.kind == "holding"]
+    if not holding:
+        return ramp_s
+    await asyncio.sleep(ramp_s)
+    await _engage(sdo, holding)
+    return 0.0
 
 
-async def switch_off(sdo: SdoClient, config: DriveConfig, brakes: Sequence[BrakeConfig], who: str) -> float:
-    """Holding brakes, power off, and no guarding of a master that is not there any more.
+async def switch_off(sdo: SdoClient, config: DriveConfig, who: str) -> float:
+    """Power off, and no guarding of a master that is not there any more.
 
     Args:
-        sdo, config, brakes: as for :func:`stop`.
+        sdo, config: as for :func:`stop`.
         who: the drive for people.
 
     Returns:
@@ -58,13 +63,16 @@ async def switch_off(sdo: SdoClient, config: DriveConfig, brakes: Sequence[Brake
         NodeAbsent, Timeout, Aborted: it does not answer, or refuses.
         DeviceFault: its power stage stays on.
     """
-    await _engage(sdo, [brake for brake in brakes if brake.kind == "holding"])
     await sdo.write(_CONTROLWORD, int(Command.DISABLE_VOLTAGE))
-    state = state_of(await sdo.read_int(_STATUSWORD))
-    if state is None or state.power_stage_on:
+    if await _has_torque(sdo):
         raise DeviceFault(f"{who} does not switch off", node=sdo.node, remedy="take its motor power away")
     await sdo.write(OBJECTS["life_time_factor"], 0)
     return await _speed_m_s(sdo, config)
+
+
+async def _has_torque(sdo: SdoClient) -> bool:
+    state = state_of(await sdo.read_int(_STATUSWORD))
+    return state is None or state.power_stage_on
 
 
 async def _speed_m_s(sdo: SdoClient, config: DriveConfig) -> float:
