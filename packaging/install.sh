@@ -1,5 +1,5 @@
 #!/bin/sh
-# Installs canhelm as a service: packaging/install.sh, called by `make install`.
+# Installs canhelm as a service: packaging/install.sh [files], called by `make install`; "files" leaves the program out.
 # DESTDIR is where a package is put together, empty for this machine; PREFIX is where the program will live.
 set -eu
 cd "$(dirname "$0")/.."
@@ -47,12 +47,13 @@ make_known() { # to the running system: users, folders, units, rules
 	command -v udevadm >/dev/null && udevadm control --reload || true
 }
 
-case "$($PYTHON -c 'import sys; print(sys.base_prefix)')" in
+install_files
+[ "${1:-all}" = files ] && exit
+case "$("$PYTHON" -c 'import sys; print(sys.base_prefix)')" in
 /home/* | /root/*)
 	echo "$PYTHON lives in a home folder, which the service may not see: make SERVICE_PYTHON=/usr/bin/python3 install" >&2
 	exit 1
 	;;
 esac
-install_files
 install_program
 if [ -z "$root" ]; then make_known; fi
