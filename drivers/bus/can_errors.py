@@ -127,7 +127,7 @@ def _words(classes: int, details: bytes) -> Iterator[str]:
         yield from _set_bits(_CONTROLLER_WORDS, details[1], "controller problem")
     if classes & NO_ACKNOWLEDGE:
         yield "no node acknowledges"
-    if classes & PROTOCOL:
+    if classes & PROTOCOL and (details[2] or not classes & NO_ACKNOWLEDGE):
         yield _protocol(details[2], details[3])
     if classes & TRANSCEIVER:
         yield from _transceiver(details[4])

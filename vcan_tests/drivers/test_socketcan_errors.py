@@ -41,6 +41,7 @@ def frame(classes: int, **details: int) -> tuple[int, bytes]:
         (frame(0x010, d4=0x80), "CANL shorted to CANH"),
         (frame(0x020), "no node acknowledges"),
         (frame(0x0A0), "no node acknowledges"),
+        (frame(0x0A8, d3=0x19), "no node acknowledges"),
         (frame(0x040), "bus-off"),
         (frame(0x080), "bus error"),
         (frame(0x100), "controller restarted"),
