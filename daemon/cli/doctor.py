@@ -28,6 +28,11 @@ ARPHRD_CAN = "280"
 IFF_UP = 1
 WANTED_QUEUE = 100
 """Frames; the kernel's default of 10 is less than one control cycle of a robot sends."""
+RESTART_MS = 100
+"""Delay after which a controller that went bus-off tries again."""
+WANTED_BUFFER = 1000
+"""Frames that the kernel shall keep for a daemon that is late."""
+RAISE_BUFFER = "sudo sysctl -w net.core.rmem_max=4194304, then restart the daemon"
 LATE_SHARE = 0.001
 SLOW_LINE = 0.8
 """Share of its planned rate below which a serial line is slow."""
@@ -125,18 +130,38 @@ def interface_finding(name: str, folder: Path, details: Mapping[str, Any]) -> Fi
     shown = f"{rate} bit/s, {state or 'state unknown'}, queue of {queue}" if rate else f"queue of {queue}"
     if not int(_read(folder / "flags") or "0", 16) & IFF_UP:
         virtual = rate is None and name.startswith("vcan")
-        set_up = f"sudo ip link set {name} up" + ("" if virtual else " type can bitrate 1000000 restart-ms 100")
-        return Finding(name, "problem", f"down, {shown}", set_up)
+        set_up = "" if virtual else f" type can bitrate {rate or 1000000} restart-ms {RESTART_MS}"
+        return Finding(name, "problem", f"down, {shown}", f"sudo ip link set {name} up{set_up}")
     if state == "BUS-OFF":
         mend = f"check cable, termination and bit rate, then: sudo ip link set {name} type can restart"
         return Finding(name, "problem", shown, mend)
+    if state in ("ERROR-PASSIVE", "ERROR-WARNING"):
+        return Finding(name, "note", shown, "check cable, termination, bit rate, and that a node has power")
     if queue < WANTED_QUEUE:
         return Finding(name, "note", shown, f"sudo ip link set {name} txqueuelen {WANTED_QUEUE}")
+    if rate and details.get("restart_ms") == 0:
+        mend = f"{name} type can restart-ms {RESTART_MS}; sudo ip link set {name} up"
+        mend = f"sudo ip link set {name} down; sudo ip link set {mend}"
+        return Finding(name, "note", f"up, {shown}, stays bus-off once it is", mend)
     return Finding(name, "ok", f"up, {shown}")
 
 
+def bit_rate_findings(bus: Mapping[str, Any], details: Mapping[str, Any]) -> Iterator[Finding]:
+    """Whether the interface has the bit rate that the daemon's profile gives.
+
+    Args:
+        bus: of the daemon's status.
+        details: of that interface, as :func:`link_details` gives them.
+    """
+    name, wanted, rate = bus.get("name"), bus.get("bit_rate"), details.get("bitrate")
+    if rate and rate != wanted:
+        set_up = f"sudo ip link set {name} up type can bitrate {wanted} restart-ms {RESTART_MS}"
+        mend = f"sudo ip link set {name} down; {set_up}"
+        yield Finding("bit rate", "problem", f"{name} has {rate} bit/s, the profile says {wanted}", mend)
+
+
 def link_details(name: str) -> dict[str, Any]:
-    """Bit rate and controller state of an interface as ``ip`` tells them; empty where it does not."""
+    """Bit rate, controller state and restart delay of an interface as ``ip`` tells them; empty where it does not."""
     tool = shutil.which("ip")
     if tool is None:
         return {}
@@ -144,7 +169,8 @@ def link_details(name: str) -> dict[str, Any]:
     try:
         told = subprocess.run(command, capture_output=True, text=True, timeout=5.0, check=False)
         data = json_text.loads(told.stdout)[0]["linkinfo"]["info_data"]
-        return {"bitrate": data.get("bittiming", {}).get("bitrate"), "state": data.get("state")}
+        rate = data.get("bittiming", {}).get("bitrate")
+        return {"bitrate": rate, "state": data.get("state"), "restart_ms": data.get("restart_ms")}
     except (OSError, subprocess.TimeoutExpired, ValueError, LookupError, TypeError, AttributeError):
         return {}
 
@@ -170,7 +196,10 @@ def _daemon_findings(options: Options) -> Iterator[Finding]:
         try:
             with Client(path or options.socket, options.robot) as client:
                 yield Finding("daemon", "ok", f"answers on {client.path}")
-                yield from status_findings(client.status())
+                status = client.status()
+                yield from status_findings(status)
+                bus = status.get("bus") or {}
+                yield from bit_rate_findings(bus, link_details(str(bus.get("name"))))
         except CanhelmError as error:
             yield Finding("daemon", "problem", error.message, error.remedy or "")
 
@@ -232,11 +261,19 @@ def _cycle_finding(cycle: Mapping[str, Any], pid: int | None) -> Finding:
 
 
 def _bus_finding(bus: Mapping[str, Any]) -> Finding:
+    if bus.get("down"):
+        return Finding("bus", "problem", f"{bus.get('name')} does not work: {bus['down']}", str(bus.get("remedy", "")))
+    if bus.get("dropped_overflow"):
+        return Finding("bus", "problem", f"{bus['dropped_overflow']} frames came too fast for it", RAISE_BUFFER)
     lost = {key: value for key, value in bus.items() if "drop" in key and isinstance(value, int) and value}
     if lost:
         told = ", ".join(f"{key} {value}" for key, value in lost.items())
         return Finding("bus", "problem", told, "lower the load, or look for a node that does not acknowledge")
-    return Finding("bus", "ok", f"load {float(bus.get('load') or 0.0):.1%}, nothing dropped")
+    load = f"load {float(bus.get('load') or 0.0):.1%}, nothing dropped"
+    room = bus.get("receive_buffer_frames", WANTED_BUFFER)
+    if room < WANTED_BUFFER:
+        return Finding("bus", "note", f"{load}, the kernel keeps {room} frames for a daemon that is late", RAISE_BUFFER)
+    return Finding("bus", "ok", load)
 
 
 def _line_findings(bus: Mapping[str, Any], cycle: Mapping[str, Any]) -> Iterator[Finding]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from daemon.cli.doctor import Finding, interface_finding, interface_findings, status_findings
+from daemon.cli.doctor import Finding, bit_rate_findings, interface_finding, interface_findings, status_findings
 from daemon.cli.main import main
 
 READY = {"node": 1, "name": "rear_right", "node_state": "ready", "state": "disabled"}
@@ -45,6 +45,30 @@ def test_bus_off_is_a_problem(tmp_path: Path) -> None:
 def test_a_short_queue_is_noted(tmp_path: Path) -> None:
     found = interface_finding("can0", interface(tmp_path, queue="10"), {})
     assert (found.verdict, "txqueuelen" in found.mend) == ("note", True)
+
+
+def test_a_controller_that_stays_bus_off_is_noted(tmp_path: Path) -> None:
+    details = {"bitrate": 1_000_000, "state": "ERROR-ACTIVE", "restart_ms": 0}
+    found = interface_finding("can0", interface(tmp_path), details)
+    assert (found.verdict, "type can restart-ms 100" in found.mend) == ("note", True)
+
+
+def test_a_controller_with_many_errors_is_noted(tmp_path: Path) -> None:
+    found = interface_finding("can0", interface(tmp_path), {"bitrate": 1_000_000, "state": "ERROR-PASSIVE"})
+    assert (found.verdict, "termination" in found.mend) == ("note", True)
+
+
+def test_another_bit_rate_than_the_profiles_is_a_problem() -> None:
+    (found,) = bit_rate_findings({"name": "can0", "bit_rate": 1_000_000}, {"bitrate": 500_000})
+    assert found.verdict == "problem"
+    assert found.mend == (
+        "sudo ip link set can0 down; sudo ip link set can0 up type can bitrate 1000000 restart-ms 100"
+    )
+
+
+@pytest.mark.parametrize("details", [{}, {"bitrate": None}, {"bitrate": 1_000_000}])
+def test_the_right_bit_rate_and_an_unknown_one_are_no_finding(details: dict[str, Any]) -> None:
+    assert not list(bit_rate_findings({"name": "can0", "bit_rate": 1_000_000}, details))
 
 
 def test_an_interface_in_order_is_ok(tmp_path: Path) -> None:
@@ -97,6 +121,21 @@ def test_a_log_that_cannot_be_written_is_told(recording: dict[str, Any], verdict
 def test_dropped_frames_are_a_problem() -> None:
     found = findings(bus={"load": 0.2, "dropped_full": 3})["bus"]
     assert (found.verdict, found.finding) == ("problem", "dropped_full 3")
+
+
+def test_a_bus_that_is_down_is_told_with_its_remedy() -> None:
+    found = findings(bus={"name": "can0", "down": "bus-off", "remedy": "check wiring"})["bus"]
+    assert (found.verdict, found.finding, found.mend) == ("problem", "can0 does not work: bus-off", "check wiring")
+
+
+def test_frames_that_overflowed_the_receive_buffer_are_a_problem() -> None:
+    found = findings(bus={"load": 0.9, "dropped_overflow": 12})["bus"]
+    assert (found.verdict, "net.core.rmem_max" in found.mend) == ("problem", True)
+
+
+@pytest.mark.parametrize(("frames", "verdict"), [(555, "note"), (10_922, "ok")])
+def test_a_small_receive_buffer_is_noted(frames: int, verdict: str) -> None:
+    assert findings(bus={"load": 0.1, "receive_buffer_frames": frames})["bus"].verdict == verdict
 
 
 def test_a_healthy_daemon_has_no_problem() -> None:
