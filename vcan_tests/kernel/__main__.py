@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 
+from vcan_tests.kernel.errors import MissingTool
 from vcan_tests.kernel.guest import NO_STATUS, TIMED_OUT, exchange_folder, run_in_guest
-from vcan_tests.kernel.tools import MissingTool, require_tools
+from vcan_tests.kernel.tools import require_tools
 
 
 def main() -> int:

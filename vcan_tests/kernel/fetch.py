@@ -9,8 +9,8 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+from vcan_tests.kernel.errors import MissingTool
 from vcan_tests.kernel.registers import needs_wide_registers, wide_registers
-from vcan_tests.kernel.tools import MissingTool
 
 PACKAGE = "user-mode-linux"
 

@@ -7,6 +7,8 @@ import tempfile
 import zlib
 from pathlib import Path
 
+from vcan_tests.kernel.errors import MissingTool
+
 SOURCE = Path(__file__).with_name("wide_registers.c")
 
 
@@ -19,12 +21,13 @@ def wide_registers(cache: Path) -> Path:
     """The library, compiled once for each version of its source.
 
     Raises:
-        subprocess.CalledProcessError: the C compiler refused; its words went to stderr.
+        MissingTool: the C compiler refused; its words went to stderr.
     """
     library = cache / f"wide_registers-{zlib.crc32(SOURCE.read_bytes()):08x}.so"
     if not library.exists():
         with tempfile.TemporaryDirectory(dir=cache) as folder:
             compiled = Path(folder) / library.name
-            subprocess.run(["cc", "-O2", "-shared", "-fPIC", "-o", compiled, SOURCE, "-ldl"], check=True)
+            if subprocess.run(["cc", "-O2", "-shared", "-fPIC", "-o", compiled, SOURCE, "-ldl"]).returncode:
+                raise MissingTool("cc can't compile what this CPU needs; as root: apt-get install gcc libc6-dev")
             compiled.rename(library)
     return library

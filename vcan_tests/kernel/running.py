@@ -8,6 +8,8 @@ import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from vcan_tests.kernel.errors import MissingTool
+
 BUSES = ("vcan0", "vcan1")
 
 
@@ -30,13 +32,13 @@ def buses_up() -> Iterator[None]:
     """vcan0 and vcan1, up; those that were not there before are gone again afterwards.
 
     Raises:
-        OSError: one of them is there and can't be brought up.
+        MissingTool: one of them is there and can't be brought up.
     """
     made = [bus for bus in BUSES if _ip("link", "add", "dev", bus, "type", "vcan")]
     try:
         for bus in BUSES:
             if not _ip("link", "set", "dev", bus, "txqueuelen", "1000", "up"):
-                raise OSError(f"{bus} can't be brought up; look at it with: ip -details link show {bus}")
+                raise MissingTool(f"{bus} can't be brought up; look at it with: ip -details link show {bus}")
         yield
     finally:
         for bus in made:

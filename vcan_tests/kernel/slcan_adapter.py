@@ -14,6 +14,7 @@ import socket
 import struct
 import subprocess
 import threading
+from contextlib import ExitStack
 from types import TracebackType
 
 N_SLCAN = 17
@@ -45,16 +46,14 @@ class SlcanAdapter:
         self._adapter, self._tty = os.openpty()
         self._unplugged = threading.Event()
         self._stop_reader, self._stop_writer = os.pipe()
-        self._thread = threading.Thread(target=self._carry, name=f"slcan {interface}")
+        self._thread = threading.Thread(target=self._carry, name=f"slcan {interface}", daemon=True)
 
     def __enter__(self) -> SlcanAdapter:
         self._thread.start()
-        fcntl.ioctl(self._tty, TIOCSETD, struct.pack("i", N_SLCAN))
-        made = fcntl.ioctl(self._tty, SIOCGIFNAME, bytes(16)).rstrip(b"\0").decode()
-        if made != self.interface:
-            _ip("link", "set", "dev", made, "name", self.interface)
-        _ip("link", "set", "dev", self.interface, "type", "can", "bitrate", str(self._bit_rate))
-        self.up()
+        with ExitStack() as undo:
+            undo.callback(self.unplug)
+            self._plug_in()
+            undo.pop_all()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
@@ -101,6 +100,14 @@ class SlcanAdapter:
     def receive(self, cob_id: int, data: bytes = b"") -> None:
         """Hands the kernel a data frame as if it came from the wire."""
         self._tell(f"t{cob_id:03X}{len(data)}{data.hex().upper()}")
+
+    def _plug_in(self) -> None:
+        fcntl.ioctl(self._tty, TIOCSETD, struct.pack("i", N_SLCAN))
+        made = fcntl.ioctl(self._tty, SIOCGIFNAME, bytes(16)).rstrip(b"\0").decode()
+        if made != self.interface:
+            _ip("link", "set", "dev", made, "name", self.interface)
+        _ip("link", "set", "dev", self.interface, "type", "can", "bitrate", str(self._bit_rate))
+        self.up()
 
     def _tell(self, line: str) -> None:
         os.write(self._adapter, line.encode() + b"\r")

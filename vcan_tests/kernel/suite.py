@@ -13,9 +13,10 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from vcan_tests.kernel import running
+from vcan_tests.kernel.errors import MissingTool
 from vcan_tests.kernel.guest import NO_STATUS, TIMED_OUT, exchange_folder, run_in_guest
 from vcan_tests.kernel.processes import run_to_end
-from vcan_tests.kernel.tools import MissingTool, require_tools
+from vcan_tests.kernel.tools import require_tools
 
 MARKS = ("vcan", "systemd")
 WHY = {TIMED_OUT: ", ended by the time-out", NO_STATUS: ", the guest died"}

@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 
+from vcan_tests.kernel.errors import MissingTool
 from vcan_tests.kernel.registers import needs_wide_registers
 
 PACKAGE_OF = {
@@ -16,10 +17,6 @@ PACKAGE_OF = {
     "ip": "iproute2",
     "tshark": "tshark",
 }
-
-
-class MissingTool(Exception):
-    """Something from outside the project is not there; the message says how to get it."""
 
 
 def require_tools() -> None:

@@ -184,6 +184,12 @@ def test_errors_on_the_wire_reach_a_socket_that_asks_for_them(sockets: ExitStack
         assert frames_until(bus, no_acknowledge)
 
 
+def test_an_adapter_that_cant_be_set_up_leaves_nothing_behind() -> None:
+    with pytest.raises(subprocess.CalledProcessError), SlcanAdapter(bit_rate=123_456):
+        pass
+    assert "can0" not in [name for _, name in socket.if_nameindex()]
+
+
 def test_the_interface_vanishes_with_its_adapter() -> None:
     with SlcanAdapter() as adapter:
         adapter.unplug()
