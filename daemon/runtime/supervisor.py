@@ -58,7 +58,7 @@ class Supervisor:
         self._stale_s = master.network.late_after_cycles * period_s
         self._numbers = itertools.count(1)
         self._tasks = TaskSet(self._on_task_failure)
-        self._watch = DeviceWatch(devices, period_s, master.network.late_after_cycles)
+        self._watch = DeviceWatch(devices, period_s, master.bus, master.network.late_after_cycles)
         self._stopping = stopping = Stopping(devices, vehicle, self.motions, self._tasks, self.log, self._drop_targets)
         self.stop, self.estop, self.fault = stopping.stop, stopping.estop, stopping.fault
         self.power_off, self.until_rest = stopping.power_off, stopping.until_rest
@@ -86,13 +86,17 @@ class Supervisor:
     @property
     def message(self) -> str:
         """One sentence about the state: what is wrong, or what is waited for."""
-        return self._stopping.message or self.bus_missing or "; ".join(self._waiting())
+        return self._stopping.message or self._bus_trouble or "; ".join(self._waiting())
+
+    @property
+    def _bus_trouble(self) -> str:
+        return self.bus_missing or str(self.master.bus.trouble or "")
 
     @property
     def sentence(self) -> str:
         """State and message in one short line: of several nodes that are waited for, the first one."""
         waiting = self._waiting()
-        if self._stopping.message or self.bus_missing or not waiting:
+        if self._stopping.message or self._bus_trouble or not waiting:
             return f"{self.state}: {self.message}" if self.message else str(self.state)
         others = f" (and {len(waiting) - 1} more)" if len(waiting) > 1 else ""
         first = waiting[0] + others

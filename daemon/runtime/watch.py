@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from canhelm.errors import DeviceFault
+from drivers.bus.contract import Bus
 from drivers.canopen.device import CanopenDevice
 from drivers.canopen.master import NodeEvent
 from drivers.contract import Device, NodeState
@@ -25,10 +26,12 @@ class DeviceWatch:
     Args:
         devices: all devices.
         period_s: the control cycle's period.
+        bus: on which they are.
         late_after_cycles: see ``Network.late_after_cycles``.
     """
 
-    def __init__(self, devices: Devices, period_s: float, late_after_cycles: float = 1.0) -> None:
+    def __init__(self, devices: Devices, period_s: float, bus: Bus, late_after_cycles: float = 1.0) -> None:
+        self._bus = bus
         self._devices = tuple(devices.by_node.values())
         self._by_node = devices.by_node
         self._period_s = period_s
@@ -65,7 +68,10 @@ class DeviceWatch:
         return cycles
 
     def _who_is_silent(self, device: CanopenDevice) -> tuple[str, str]:
-        """What is silent, and what to do: this node, or all of them."""
+        """What is silent, and what to do: the interface, all nodes, or this one."""
+        trouble = self._bus.trouble
+        if trouble is not None:
+            return trouble.message, trouble.remedy or ""
         if all(cycles >= SILENT_CYCLES for _, cycles in self._unread.values()):
             return "no node answers", "check the cable to the robot, and its power"
         return f"{device.who} is silent", "check its power and the CAN cable"

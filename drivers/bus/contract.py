@@ -13,6 +13,8 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
+from canhelm.errors import BusOff
+
 RTR_FLAG = 0x4000_0000
 ID_MASK = 0x7FF
 
@@ -43,6 +45,7 @@ class Bus(ABC):
         on_silent: told of a node whose silence is certain, because who forwards to it waited for it in vain.
         taps: called with every frame, received or sent by this interface, in wire order (recorder, monitor).
         counters: what went over the interface.
+        down: why the interface does not work at the moment; None while it does.
     """
 
     def __init__(self, name: str, bit_rate: int) -> None:
@@ -52,6 +55,16 @@ class Bus(ABC):
         self.on_silent: Callable[[int], None] | None = None
         self.taps: list[FrameHandler] = []
         self.counters = BusCounters()
+        self.down: str | None = None
+
+    @property
+    def trouble(self) -> BusOff | None:
+        """Why the interface does not work, with what mends it; None while it does."""
+        return BusOff(f"{self.name} does not work: {self.down}", remedy=self.remedy()) if self.down else None
+
+    def remedy(self) -> str:
+        """What mends an interface that is down."""
+        return ""
 
     @abstractmethod
     async def open(self) -> None:

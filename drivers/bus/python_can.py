@@ -53,7 +53,6 @@ class PythonCanBus(Bus):
     Attributes:
         interface: python-can's name of the kind of interface.
         channel: which one.
-        down: why the interface does not work at the moment; None while it does.
         foreign: frames that are no classic base frames, and garbage of the adapter.
     """
 
@@ -61,7 +60,6 @@ class PythonCanBus(Bus):
         super().__init__(PurePath(channel).name, bit_rate)
         self.interface = interface
         self.channel = channel
-        self.down: str | None = None
         self.foreign = 0
         self._queue = TransmitQueue(self._transmit, self.counters)
         self._meter = LoadMeter(bit_rate)
@@ -90,7 +88,7 @@ class PythonCanBus(Bus):
 
     def details(self) -> dict[str, Any]:
         """What is wrong with the interface, if anything is."""
-        trouble = {"down": self.down, "remedy": self._remedy()} if self.down else {}
+        trouble = {"down": self.down, "remedy": self.remedy()} if self.down else {}
         return {**trouble, "foreign": self.foreign}
 
     def send(self, can_id: int, data: bytes = b"", deadline_s: float = math.inf) -> None:
@@ -175,7 +173,7 @@ class PythonCanBus(Bus):
         self.counters.error_frames += 1
         if message.arbitration_id & _ERROR_CLASS_BUS_OFF and self.down is None:
             self.down = "bus-off"
-            LOGGER.error("%s is bus-off (%s; %s)", self.name, BUS_OFF_CAUSES, self._remedy())
+            LOGGER.error("%s is bus-off (%s; %s)", self.name, BUS_OFF_CAUSES, self.remedy())
 
     def _loop_time(self, wall_s: float) -> float:
         """The loop's time of a wall-clock stamp less than a second old; now for interfaces with clocks of their own."""
@@ -253,9 +251,10 @@ class PythonCanBus(Bus):
         LOGGER.info("%s is back", self.name)
 
     def _bus_off(self, error: Exception) -> BusOff:
-        return BusOff(f"{self.interface} interface {self.channel} is down or missing: {error}", remedy=self._remedy())
+        return BusOff(f"{self.interface} interface {self.channel} is down or missing: {error}", remedy=self.remedy())
 
-    def _remedy(self) -> str:
+    def remedy(self) -> str:
+        """What to look at where the adapter does not work."""
         return "is the adapter plugged in, may this user open it, and are its driver and python-can extra installed?"
 
 

@@ -87,7 +87,6 @@ class SocketCanBus(Bus):
         bit_rate: bit/s that it is expected to have; who sets the interface up decides.
 
     Attributes:
-        down: why the interface does not work at the moment; None while it does.
         foreign: frames that are no classic base frames.
         overflowed: frames that the kernel dropped because its receive buffer was full.
     """
@@ -95,13 +94,13 @@ class SocketCanBus(Bus):
     def __init__(self, channel: str, bit_rate: int) -> None:
         super().__init__(channel, bit_rate)
         self.taps = _Taps(self._set_filters)
-        self.down: str | None = None
         self.foreign = 0
         self.overflowed = 0
         self._controller = Controller(channel, f"then sudo ip link set {channel} type can restart")
         self._load = InterfaceLoad(channel, bit_rate)
         self._queue = TransmitQueue(self._transmit, self.counters)
         self._link: socket.socket | None = None
+        self._no_can = False
         self._link_overflowed = 0
         self._buffered_frames = 0
         self._wanted: Collection[int] | None = None
@@ -124,7 +123,7 @@ class SocketCanBus(Bus):
 
     def details(self) -> dict[str, Any]:
         """What is wrong with the interface, if anything is, and what was lost on it."""
-        trouble = {"down": self.down, "remedy": self._remedy()} if self.down else {}
+        trouble = {"down": self.down, "remedy": self.remedy()} if self.down else {}
         return {
             **trouble,
             **self._controller.details(),
@@ -318,10 +317,13 @@ class SocketCanBus(Bus):
 
     def _bus_off(self, error: OSError) -> BusOff:
         self.down = error.strerror or str(error)
-        remedy = NO_KERNEL_CAN if error.errno == errno.EAFNOSUPPORT else self._remedy()
-        return BusOff(f"socketcan interface {self.name} is down or missing: {error}", remedy=remedy)
+        self._no_can = error.errno == errno.EAFNOSUPPORT
+        return BusOff(f"socketcan interface {self.name} is down or missing: {error}", remedy=self.remedy())
 
-    def _remedy(self) -> str:
+    def remedy(self) -> str:
+        """What mends an interface that is down, missing or bus-off, or a kernel without any."""
+        if self._no_can:
+            return NO_KERNEL_CAN
         if self._controller.bus_off:
             return self._controller.remedy()
         if self.name.startswith("vcan"):

@@ -99,7 +99,13 @@ class Master:
         return f"node {node} ({name})" if name else f"node {node}"
 
     def tell(self, node: int, kind: str, severity: str, message: str, remedy: str = "") -> None:
-        """Pass an event about a node on; arguments as in :class:`NodeEvent`."""
+        """Pass an event about a node on; arguments as in :class:`NodeEvent`.
+
+        A node that is lost while the interface does not work is not to blame.
+        """
+        trouble = self.bus.trouble
+        if kind == "lost" and trouble is not None:
+            message, remedy = f"{message}; {trouble.message}", trouble.remedy or ""
         if self.on_event is not None:
             now = asyncio.get_running_loop().time()
             self.on_event(NodeEvent(now, node, self.names.get(node, ""), kind, severity, message, remedy))

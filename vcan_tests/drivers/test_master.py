@@ -267,3 +267,13 @@ async def test_closing_leaves_no_life_guarding_behind() -> None:
         b.cycle.stop()
         await asyncio.sleep(1.0)
         assert not any(event.kind == "emcy" for event in b.events)
+
+
+async def test_a_node_that_is_lost_with_the_interface_is_not_to_blame() -> None:
+    async with bench() as b:
+        b.events.clear()
+        b.port.down = "Network is down"
+        b.master.tell(3, "lost", "error", "node 3 (front_left) is lost", "check its motor power")
+        (event,) = b.events
+    assert event.message == "node 3 (front_left) is lost; vcan0 does not work: Network is down"
+    assert "motor power" not in event.remedy
