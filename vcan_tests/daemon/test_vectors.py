@@ -12,19 +12,13 @@ import pytest
 
 from daemon.loops.geometry import TurningSolution, clamp, contact_points, solve_turning
 from profiles.schema import PairedSteerGeometry
+from vcan_tests.daemon import vectors_turtle
 from vcan_tests.vectors_loader import read_vectors, vector_paths
 
 Case = dict[str, Any]
 
 LEFT_OUT: Final = frozenset(
     {
-        "seed000_calculate_time",
-        "seed000_omni_kinematics",
-        "seed000_planner_calls",
-        "seed000_slip_detection",
-        "seed000_traction_sequences",
-        "seed000_traction_simulations",
-        "seed000_trajectories",
         "seed002_closed_loop",
         "seed002_kinematics",
         "seed002_open_loop",
@@ -114,6 +108,7 @@ def check_published_program(motion: TurningSolution, speed: float, printed: Case
 
 
 CHECKS: Final[dict[str, Callable[[Case], None]]] = {
+    **vectors_turtle.CHECKS,
     "seed001_parallel": check_parallel,
     "seed001_turning": check_turning,
 }
