@@ -22,4 +22,4 @@ sed -e "s/@VERSION@/${VERSION:-$version}/" -e "s/@ARCHITECTURE@/$architecture/" 
 (cd "$root" && find opt usr -type f -print0 | xargs -0 md5sum) >"$root/DEBIAN/md5sums"
 
 mkdir -p dist
-dpkg-deb --root-owner-group --build "$root" dist
+dpkg-deb --root-owner-group -Zgzip --build "$root" dist
