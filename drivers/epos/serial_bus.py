@@ -90,6 +90,7 @@ class SerialGatewayBus(Bus):
         self._encoders = encoders
         self._facts = facts
         self._bridges: dict[int, SdoBridge] = {}
+        self._long_transfers = asyncio.Lock()
         self._readings = Readings(gateway, encoders, self._submit, self._receive)
         self._toggles: dict[int, int] = {}
         self._spoke_s: dict[int, float] = {}
@@ -166,7 +167,8 @@ class SerialGatewayBus(Bus):
         elif can_id == 0x000:
             self._command(NmtCommand(data[0]), data[1])
         elif can_id == 0x080:
-            self._readings.begin_round(self.silent)
+            busy = {node for node, bridge in self._bridges.items() if bridge.transferring}
+            self._readings.begin_round(self.silent | busy)
         elif node == self.gateway:
             self.write(EPOS["controlword"].index, 0, data[:2], deadline_s)
         else:
@@ -204,7 +206,9 @@ class SerialGatewayBus(Bus):
                 self._heard(node)
                 self._receive(0x580 + node, data)
 
-            bridge = self._bridges[node] = SdoBridge(node, self.line, table, answer, self._on_silence)
+            bridge = self._bridges[node] = SdoBridge(
+                node, self.line, table, self._long_transfers, answer, self._on_silence
+            )
         return bridge
 
     # --- guarding ------------------------------------------------------------------------------------------------

@@ -78,11 +78,11 @@ class Readings:
             self.states[each] = state
             self._faulty.discard(each)
 
-    def begin_round(self, silent: set[int]) -> None:
-        """Ask every node that runs and is not being asked already; a reading that comes late is still a reading."""
+    def begin_round(self, left_out: set[int]) -> None:
+        """Ask every other node that runs, unless it is being asked already; a late reading is still a reading."""
         self._rounds += 1
         for node, state in self.states.items():
-            if state is not NmtState.OPERATIONAL or node in silent or node in self._asked:
+            if state is not NmtState.OPERATIONAL or node in left_out or node in self._asked:
                 continue
             if node == self._gateway:
                 self._read_gateway()

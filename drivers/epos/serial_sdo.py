@@ -37,6 +37,7 @@ class SdoBridge:
         node: node id as the gateway takes it.
         line: carries the requests.
         table: the node's object dictionary, which tells an object's length.
+        long_transfers: held by a transfer in segments, as the gateway keeps only one at a time.
         answer: takes each SDO answer of the node, 8 bytes.
         on_silence: called when the node did not answer the gateway, or the line failed; the master then waits in vain.
     """
@@ -46,18 +47,25 @@ class SdoBridge:
         node: int,
         line: SerialLine,
         table: ObjectTable,
+        long_transfers: asyncio.Lock,
         answer: Callable[[bytes], None],
         on_silence: Callable[[int], None],
     ) -> None:
         self._node = node
         self._line = line
         self._table = table
+        self._long_transfers = long_transfers
         self._answer = answer
         self._on_silence = on_silence
         self._address = (0, 0)
         self._value = b""
         self._left = 0
         self._task: asyncio.Task[None] | None = None
+
+    @property
+    def transferring(self) -> bool:
+        """Whether a transfer in segments runs or waits; another request to the node would end it."""
+        return self._task is not None and not self._task.done()
 
     def take(self, data: bytes, deadline_s: float) -> None:
         """Take one request frame of the master."""
@@ -156,7 +164,8 @@ class SdoBridge:
     def _run(self, transfer: Coroutine[Any, Any, None]) -> None:
         async def guarded() -> None:
             try:
-                await transfer
+                async with self._long_transfers:
+                    await transfer
             except CanhelmError as error:
                 self._failed(error)
 
