@@ -35,6 +35,7 @@ FINAL_SPEED_SHARE: Final = 0.8
 LEAST_FINAL_SPEED_M_S: Final = 0.3
 """Of one axis; half of it and more is rounded up, less is rounded to 0."""
 _LEAST_LIMIT: Final = 1e-300
+"""Keeps an axis' share of a limit from being rounded to 0."""
 
 
 class Branch(StrEnum):
@@ -50,7 +51,7 @@ class Branch(StrEnum):
     ONLY_Y_MOVES = "only_y_moves"
     SYNCHRONISED = "synchronised"
     INFEASIBLE = "infeasible"
-    """v_max is below the rounded final speed, or a number is unusable: brakes. The listing computes NaN here."""
+    """v_max is not above the rounded final speed, or a number is unusable: brakes. The listing computes NaN here."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +174,7 @@ class PublishedPlanner:
             return self._infeasible(problem)
         final = feasible_final_velocity(problem.final_velocity_m_s, problem.v_max)
         problem = replace(problem, final_velocity_m_s=final)
-        if not (abs(final[0]) <= problem.v_max and abs(final[1]) <= problem.v_max):
+        if not (abs(final[0]) < problem.v_max and abs(final[1]) < problem.v_max):
             return self._infeasible(problem)
         limit = controlled or ControlledLimit(problem.a_max, problem.a_max, False)
         angles = self._angle_range(problem)
