@@ -120,7 +120,8 @@ class Life:
             LOGGER.info("robot %s on %s, socket %s", app.profile.name, app.spec, app.server and app.server.path)
             manager.ready()
             await self._turn.wait()
-            LOGGER.info("going down: stopping the vehicle")
+            if self._ending:
+                LOGGER.info("going down: stopping the vehicle")
         finally:
             doubtful = await app.close()
         return doubtful

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import select
 import socket
 from pathlib import Path
 
@@ -24,6 +25,10 @@ class Manager:
                 messages.append(self._socket.recv(4096).decode().split("\n"))
             except BlockingIOError:
                 return messages
+
+    def hears(self, within_s: float) -> bool:
+        """Wait for a message; False where none comes in that time."""
+        return bool(select.select([self._socket], [], [], within_s)[0])
 
     def fed(self) -> int:
         """How often the watchdog was fed since the last call."""
