@@ -33,9 +33,15 @@ RESTART_MS = 100
 WANTED_BUFFER = 1000
 """Frames that the kernel shall keep for a daemon that is late."""
 RAISE_BUFFER = "sudo sysctl -w net.core.rmem_max=4194304, then restart the daemon"
-LATE_SHARE = 0.001
+LATE_SHARE, FEW_LATE = 0.001, 5
+"""More late cycles than this share of all, and than this number, are many."""
+WATCHED_S = 1.0
+"""How long the daemon's counters are watched: what is not counted meanwhile is over."""
+STARTING = ("waiting", "booting")
+"""States of a vehicle whose nodes are being configured, which a serial line has to carry beside its cycle."""
 SLOW_LINE = 0.8
 """Share of its planned rate below which a serial line is slow."""
+FASTER_LINE = "free this machine; a USB adapter needs its latency timer at 1 ms (setserial DEVICE low_latency)"
 OLDEST_PYTHON = (3, 11)
 STYLES = {"ok": "green", "note": "yellow", "problem": "red"}
 
@@ -196,32 +202,58 @@ def _daemon_findings(options: Options) -> Iterator[Finding]:
         try:
             with Client(path or options.socket, options.robot) as client:
                 yield Finding("daemon", "ok", f"answers on {client.path}")
-                status = client.status()
-                yield from status_findings(status)
+                earlier = client.status()
+                status = _next_status(client)
+                yield from status_findings(status, earlier)
                 bus = status.get("bus") or {}
                 yield from bit_rate_findings(bus, link_details(str(bus.get("name"))))
         except CanhelmError as error:
             yield Finding("daemon", "problem", error.message, error.remedy or "")
 
 
-def status_findings(status: Mapping[str, Any]) -> Iterator[Finding]:
-    """What a daemon's status tells of trouble."""
+def _next_status(client: Client) -> Mapping[str, Any]:
+    """The status after :data:`WATCHED_S`."""
+    return next(params for method, params in client.notifications(1.0 / WATCHED_S) if method == "status")
+
+
+def status_findings(status: Mapping[str, Any], earlier: Mapping[str, Any]) -> Iterator[Finding]:
+    """What a daemon's status tells of trouble.
+
+    Args:
+        status: how it is now.
+        earlier: how it was a moment ago. What was counted before is a note, what is counted still a problem.
+    """
     state = str(status.get("state"))
     stopped = state in ("fault", "estop")
     sentence = f"{state}: {status['message']}" if status.get("message") else state
     yield Finding("vehicle", "problem" if stopped else "ok", sentence, "canhelm reset" if stopped else "")
     for node in status.get("nodes") or ():
         yield _node_finding(node)
-    api = status.get("api") or {}
-    yield _cycle_finding(status.get("cycle") or {}, api.get("pid"))
-    yield _bus_finding(status.get("bus") or {})
-    yield from _line_findings(status.get("bus") or {}, status.get("cycle") or {})
+    api, cycle, bus = (status.get(part) or {} for part in ("api", "cycle", "bus"))
+    old_api, old_cycle, old_bus = (earlier.get(part) or {} for part in ("api", "cycle", "bus"))
+    yield _cycle_finding(cycle, old_cycle, api.get("pid"))
+    yield _bus_finding(bus, old_bus, starting=state in STARTING)
+    yield from _line_findings(bus, cycle, starting=state in STARTING)
     yield from _recording_findings(status.get("recording") or {})
-    defects = api.get("internal_errors", 0)
-    if defects:
-        yield Finding(
-            "api", "problem", f"{defects} requests failed inside the daemon", "report it with the daemon's log"
-        )
+    if api.get("internal_errors"):
+        found = f"{api['internal_errors']} requests failed inside the daemon"
+        yield _counted("api", found, "report it with the daemon's log", goes_on=_goes_on(api, old_api))
+
+
+def _counted(check: str, found: str, mend: str, *, goes_on: bool) -> Finding:
+    """Something that was counted: a problem while it goes on, a note when it is over."""
+    if goes_on:
+        return Finding(check, "problem", found, mend)
+    return Finding(check, "note", f"{found}; none in the last {WATCHED_S:g} s", mend)
+
+
+def _goes_on(counters: Mapping[str, Any], earlier: Mapping[str, Any]) -> bool:
+    """Whether anything in ``counters`` that counts trouble has grown."""
+    return any(counters[key] > earlier.get(key, 0) for key in counters if _counts_trouble(key, counters[key]))
+
+
+def _counts_trouble(key: str, value: Any) -> bool:
+    return isinstance(value, int) and bool(value) and ("drop" in key or key in ("late_cycles", "internal_errors"))
 
 
 def _node_finding(node: Mapping[str, Any]) -> Finding:
@@ -231,8 +263,10 @@ def _node_finding(node: Mapping[str, Any]) -> Finding:
         return Finding(name, "problem", str(fault.get("message")), str(fault.get("remedy") or "canhelm reset"))
     if fault:
         return Finding(name, "problem", str(fault), "canhelm reset")
+    told = str(node.get("status") or node.get("node_state"))
+    if node.get("node_state") == "configuring":
+        return Finding(name, "note", f"is being configured: {told.removeprefix(f'{name}: ')}")
     if node.get("node_state") != "ready":
-        told = str(node.get("status") or node.get("node_state"))
         return Finding(name, "problem", told, "switch motor power on, and check the cable and the node id")
     return Finding(name, "ok", f"{node.get('node_state')}, {node.get('state', 'reading')}")
 
@@ -248,27 +282,34 @@ def _recording_findings(recording: Mapping[str, Any]) -> Iterator[Finding]:
         yield Finding("recording", "ok", f"{recording.get('frames')} frames in {path}")
 
 
-def _cycle_finding(cycle: Mapping[str, Any], pid: int | None) -> Finding:
+def _cycle_finding(cycle: Mapping[str, Any], earlier: Mapping[str, Any], pid: int | None) -> Finding:
     cycles, late = cycle.get("cycles", 0), cycle.get("late_cycles", 0)
     worst_ms, period_ms = cycle.get("max_lateness_ms", 0.0), 1e3 / cycle.get("hz", 100.0)
     found = f"{late} of {cycles} control cycles were late, the worst one began {worst_ms:.1f} ms late"
     mend = f"give it a real-time priority: sudo chrt -f -p 50 {pid}"
-    if late > LATE_SHARE * cycles:
-        return Finding("cycle", "problem", found, mend)
+    if late > max(FEW_LATE, LATE_SHARE * cycles):
+        return _counted("cycle", found, mend, goes_on=_goes_on(cycle, earlier))
     if worst_ms > period_ms:
         return Finding("cycle", "note", found, mend)
     return Finding("cycle", "ok", found)
 
 
-def _bus_finding(bus: Mapping[str, Any]) -> Finding:
+def _bus_finding(bus: Mapping[str, Any], earlier: Mapping[str, Any], *, starting: bool) -> Finding:
     if bus.get("down"):
         return Finding("bus", "problem", f"{bus.get('name')} does not work: {bus['down']}", str(bus.get("remedy", "")))
+    goes_on = _goes_on(bus, earlier)
     if bus.get("dropped_overflow"):
-        return Finding("bus", "problem", f"{bus['dropped_overflow']} frames came too fast for it", RAISE_BUFFER)
-    lost = {key: value for key, value in bus.items() if "drop" in key and isinstance(value, int) and value}
+        return _counted("bus", f"{bus['dropped_overflow']} frames came too fast for it", RAISE_BUFFER, goes_on=goes_on)
+    lost = {key: value for key, value in bus.items() if _counts_trouble(key, value)}
+    if lost and "planned_hz" in bus:
+        told = f"the line was too slow for {sum(lost.values())} targets"
+        if starting:
+            return Finding("bus", "note", f"{told}; it carries the configuration of nodes meanwhile")
+        return _counted("bus", told, FASTER_LINE, goes_on=goes_on)
     if lost:
         told = ", ".join(f"{key} {value}" for key, value in lost.items())
-        return Finding("bus", "problem", told, "lower the load, or look for a node that does not acknowledge")
+        mend = "lower the load, or look for a node that does not acknowledge"
+        return _counted("bus", told, mend, goes_on=goes_on)
     load = f"load {float(bus.get('load') or 0.0):.1%}, nothing dropped"
     room = bus.get("receive_buffer_frames", WANTED_BUFFER)
     if room < WANTED_BUFFER:
@@ -276,8 +317,11 @@ def _bus_finding(bus: Mapping[str, Any]) -> Finding:
     return Finding("bus", "ok", load)
 
 
-def _line_findings(bus: Mapping[str, Any], cycle: Mapping[str, Any]) -> Iterator[Finding]:
-    """What a serial line gives, where there is one, and what a cable that is pulled would mean."""
+def _line_findings(bus: Mapping[str, Any], cycle: Mapping[str, Any], *, starting: bool) -> Iterator[Finding]:
+    """What a serial line gives, where there is one, and what a cable that is pulled would mean.
+
+    Its rate is not judged while the vehicle is starting.
+    """
     if "planned_hz" not in bus:
         return
     if bus.get("line_down"):
@@ -287,11 +331,9 @@ def _line_findings(bus: Mapping[str, Any], cycle: Mapping[str, Any]) -> Iterator
         return
     at = ", ".join(f"{hz} at {baud} baud" for baud, hz in bus["planned_hz_at_baud"].items())
     rate = f"{cycle.get('achieved_hz')} cycles a second at {bus['baud']} baud, planned {bus['planned_hz']} ({at})"
-    if cycle.get("achieved_hz", 0.0) < SLOW_LINE * bus["planned_hz"]:
-        remedy = "free this machine; a USB adapter needs its latency timer at 1 ms (setserial DEVICE low_latency)"
-        yield Finding(
-            "line rate", "problem", f"{rate}: the limits of the vehicle are made for the planned rate", remedy
-        )
+    if not starting and cycle.get("achieved_hz", 0.0) < SLOW_LINE * bus["planned_hz"]:
+        found = f"{rate}: the limits of the vehicle are made for the planned rate"
+        yield Finding("line rate", "problem", found, FASTER_LINE)
     if bus.get("silent_nodes"):
         nodes = ", ".join(map(str, bus["silent_nodes"]))
         yield Finding("serial line", "problem", f"{rate}; silent nodes: {nodes}", "switch their power on")

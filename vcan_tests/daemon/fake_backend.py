@@ -38,6 +38,7 @@ class FakeBackend:
         self.ran_out = threading.Event()
         self.renewals = 0
         self.padding = ""
+        self.cycle = {"cycles": 10}
         self.loop: asyncio.AbstractEventLoop
         self._leases: dict[str, asyncio.TimerHandle] = {}
         self._motions: dict[str, list[asyncio.Future[None]]] = {}
@@ -55,7 +56,7 @@ class FakeBackend:
             "state": self.state,
             "message": self.padding,
             "nodes": [node],
-            "cycle": {"cycles": 10},
+            "cycle": self.cycle,
         }
 
     def open_lease(self, client: str) -> str:

@@ -10,6 +10,7 @@ import pytest
 
 from daemon.cli.doctor import Finding, bit_rate_findings, interface_finding, interface_findings, status_findings
 from daemon.cli.main import main
+from vcan_tests.daemon.fake_backend import FakeBackend, served
 
 READY = {"node": 1, "name": "rear_right", "node_state": "ready", "state": "disabled"}
 
@@ -23,8 +24,8 @@ def interface(folder: Path, name: str = "can0", flags: str = "0x1", queue: str =
     return where
 
 
-def findings(**status: Any) -> dict[str, Finding]:
-    return {finding.check: finding for finding in status_findings({"state": "idle", **status})}
+def findings(earlier: dict[str, Any] | None = None, **status: Any) -> dict[str, Finding]:
+    return {finding.check: finding for finding in status_findings({"state": "idle", **status}, earlier or {})}
 
 
 def test_an_interface_that_is_down_is_brought_up(tmp_path: Path) -> None:
@@ -92,13 +93,34 @@ def test_a_node_that_is_waited_for_is_a_problem() -> None:
     assert (found.verdict, found.finding) == ("problem", "no boot-up")
 
 
+def test_a_node_that_is_being_configured_is_a_note_of_how_far_it_is() -> None:
+    told = "node 1 (rear_right): writing its limits and ramps"
+    node = {**READY, "node_state": "configuring", "status": told}
+    found = findings(state="booting", nodes=[node])["node 1 (rear_right)"]
+    assert (found.verdict, found.mend) == ("note", "")
+    assert found.finding == "is being configured: writing its limits and ramps"
+
+
 def test_an_emergency_stop_is_a_problem() -> None:
     assert findings(state="estop", message="emergency stop: by a person")["vehicle"].verdict == "problem"
 
 
-@pytest.mark.parametrize(("late", "verdict"), [(1, "ok"), (11, "problem")])
-def test_more_than_one_late_cycle_in_a_thousand_is_a_problem(late: int, verdict: str) -> None:
-    assert findings(cycle={"cycles": 10_000, "late_cycles": late})["cycle"].verdict == verdict
+@pytest.mark.parametrize(("late", "cycles", "verdict"), [(10, 10_000, "ok"), (11, 10_000, "problem"), (5, 809, "ok")])
+def test_more_than_one_late_cycle_in_a_thousand_is_a_problem_if_they_are_more_than_five(
+    late: int, cycles: int, verdict: str
+) -> None:
+    assert findings(cycle={"cycles": cycles, "late_cycles": late})["cycle"].verdict == verdict
+
+
+def test_cycles_that_were_late_and_are_no_more_are_a_note() -> None:
+    found = findings({"cycle": {"late_cycles": 60}}, cycle={"cycles": 10_000, "late_cycles": 60})["cycle"]
+    assert (found.verdict, "60 of 10000" in found.finding) == ("note", True)
+    assert found.finding.endswith("none in the last 1 s")
+
+
+@pytest.mark.parametrize(("before", "verdict"), [(2, "problem"), (3, "note")])
+def test_requests_that_failed_inside_the_daemon_are_a_problem_while_they_do(before: int, verdict: str) -> None:
+    assert findings({"api": {"internal_errors": before}}, api={"internal_errors": 3})["api"].verdict == verdict
 
 
 def test_a_cycle_that_was_late_by_more_than_a_period_is_noted() -> None:
@@ -121,6 +143,11 @@ def test_a_log_that_cannot_be_written_is_told(recording: dict[str, Any], verdict
 def test_dropped_frames_are_a_problem() -> None:
     found = findings(bus={"load": 0.2, "dropped_full": 3})["bus"]
     assert (found.verdict, found.finding) == ("problem", "dropped_full 3")
+
+
+@pytest.mark.parametrize("counter", ["dropped_full", "dropped_stale", "dropped_overflow"])
+def test_frames_that_were_dropped_long_ago_are_a_note(counter: str) -> None:
+    assert findings({"bus": {counter: 3}}, bus={"load": 0.2, counter: 3})["bus"].verdict == "note"
 
 
 def test_a_bus_that_is_down_is_told_with_its_remedy() -> None:
@@ -187,3 +214,27 @@ def test_a_node_that_is_silent_on_a_serial_line_is_a_problem() -> None:
 def test_a_serial_line_that_is_gone_is_a_problem() -> None:
     found = findings(bus={**LINE, "line_down": "/dev/ttyUSB0 is gone"}, cycle={})
     assert (found["serial line"].verdict, found["serial line"].finding) == ("problem", "/dev/ttyUSB0 is gone")
+
+
+@pytest.mark.parametrize("state", ["waiting", "booting"])
+def test_the_rate_of_a_line_is_not_judged_while_nodes_are_configured_over_it(state: str) -> None:
+    told = findings(state=state, bus={**LINE, "dropped_stale": 52}, cycle={"achieved_hz": 3.0})
+    assert "problem" not in {finding.verdict for finding in told.values()}
+
+
+def test_what_a_serial_line_drops_is_told_in_its_terms() -> None:
+    found = findings({"bus": {"dropped_stale": 50}}, bus={**LINE, "dropped_stale": 52}, cycle={"achieved_hz": 17.0})
+    assert (found["bus"].verdict, found["bus"].finding) == ("problem", "the line was too slow for 52 targets")
+    assert "acknowledge" not in found["bus"].mend
+
+
+def test_what_counters_counted_before_the_doctor_came_is_no_reason_for_exit_code_1(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    backend = FakeBackend()
+    backend.cycle = {"cycles": 809, "late_cycles": 60}
+    monkeypatch.setattr("daemon.cli.doctor.NETWORK_DEVICES", tmp_path)
+    monkeypatch.setattr("daemon.cli.doctor.WATCHED_S", 0.05)
+    with served(backend, tmp_path / "robot.sock") as server:
+        assert main(["doctor", "--socket", str(server.path)]) == 0
+    assert "60 of 809 control cycles were late" in capsys.readouterr().out
