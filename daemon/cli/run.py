@@ -8,6 +8,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Coroutine, Iterable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,6 +20,7 @@ from daemon.cli import journal
 from daemon.cli.output import say
 
 if TYPE_CHECKING:
+    from daemon.app import App
     from profiles.schema import Profile
 
 
@@ -58,60 +60,65 @@ def run(
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _end_before_it_began)
     from daemon.app import App, GatewayAccess
-    from daemon.life import Life
     from daemon.runtime.activation import inherited_sockets
     from daemon.runtime.clock import run_precise
-    from daemon.runtime.notify import ServiceManager
     from profiles.loader import load
 
     chosen = _bus(bus, simulate=simulate)
-    if unpowered and not simulates(chosen):
-        raise UsageError(
-            f"--unpowered is for simulated drives, and {chosen} is real", remedy="leave it out; switch its power off"
-        )
-    if record == "":
-        raise UsageError("--record is empty", remedy="name a folder or a file, as --record logs")
+    _refuse_senseless(chosen, unpowered=unpowered, record=record, virtual_time=virtual_time)
     if profile is None:
         raise UsageError(
             "which robot?", remedy="give --profile NAME or FILE; `canhelm profile list` shows the shipped ones"
         )
-    if virtual_time:
-        raise UsageError(
-            "virtual time is for demos, campaigns and tests: clients of a socket live in real time",
-            remedy="leave --virtual-time out, or use `canhelm demo --virtual-time`",
-        )
-    loaded = load(profile)
+    robot = load(profile).profile
     for given in (socket, gateway):
         _require_folder(given)
     journal.log_to_stderr(os.environ)
     faulthandler.enable()  # a watchdog ends a hung daemon by SIGABRT: tell where it hangs
     inherited = inherited_sockets(os.environ, os.getpid())
-    path = socket or _api_socket(inherited) or Path(protocol.default_socket(loaded.profile.name))
-    access = GatewayAccess(gateway or path.with_suffix(protocol.GATEWAY_SUFFIX), gateway_tcp, gateway_write)
+    path = socket or _api_socket(inherited) or Path(protocol.default_socket(robot.name))
+    make_app = partial(
+        App,
+        bus=chosen,
+        socket=path,
+        record=Path(record) if record else None,
+        seed=seed,
+        powered=not unpowered,
+        gateway=GatewayAccess(gateway or path.with_suffix(protocol.GATEWAY_SUFFIX), gateway_tcp, gateway_write),
+        inherited=inherited,
+    )
+    runner: Callable[[Coroutine[Any, Any, str]], str] = run_precise if simulates(chosen) else asyncio.run
+    say(runner(_live(make_app, profile, robot)))
+    return 0
 
-    def make_app(robot: Profile) -> App:
-        return App(
-            robot,
-            chosen,
-            socket=path,
-            record=Path(record) if record else None,
-            seed=seed,
-            powered=not unpowered,
-            gateway=access,
-            inherited=inherited,
-        )
+
+async def _live(make_app: Callable[[Profile], App], source: str, robot: Profile) -> str:
+    """The daemon's life; how it left the vehicle."""
+    from daemon.life import Life
+    from daemon.runtime.notify import ServiceManager
+    from profiles.loader import load
 
     async def load_anew() -> Profile:
-        return (await asyncio.to_thread(load, profile)).profile
+        return (await asyncio.to_thread(load, source)).profile
 
-    async def serve() -> str:
-        life = Life(make_app, load_anew, ServiceManager.of(os.environ, os.getpid()))
-        life.take_signals()
-        return await life.run(loaded.profile)
+    life = Life(make_app, load_anew, ServiceManager.of(os.environ, os.getpid()))
+    life.take_signals()
+    return await life.run(robot)
 
-    runner: Callable[[Coroutine[Any, Any, str]], str] = run_precise if simulates(chosen) else asyncio.run
-    say(runner(serve()))
-    return 0
+
+def _refuse_senseless(bus: str, *, unpowered: bool, record: str | None, virtual_time: bool) -> None:
+    """Raise UsageError for options that make no sense, or not together."""
+    if unpowered and not simulates(bus):
+        raise UsageError(
+            f"--unpowered is for simulated drives, and {bus} is real", remedy="leave it out; switch its power off"
+        )
+    if record == "":
+        raise UsageError("--record is empty", remedy="name a folder or a file, as --record logs")
+    if virtual_time:
+        raise UsageError(
+            "virtual time is for demos, campaigns and tests: clients of a socket live in real time",
+            remedy="leave --virtual-time out, or use `canhelm demo --virtual-time`",
+        )
 
 
 def _api_socket(inherited: Iterable[Path]) -> Path | None:
