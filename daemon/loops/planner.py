@@ -1,0 +1,255 @@
+"""Motion in the plane to a place, heading and velocity, as fast as the limits allow; both are reached together.
+
+Speed and acceleration are limited as vectors (the acceleration by a friction circle). A plan is made once and followed;
+made anew from any state, moving or not, it is the way from there. Nothing is kept outside the plan.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import astuple, dataclass, replace
+from enum import StrEnum
+from typing import Final
+
+from daemon.loops import planner_axis, planner_way
+from daemon.loops.planner_axis import AxisPlan
+from daemon.loops.planner_way import Way
+
+FARTHEST: Final = 1e5
+"""Largest place, heading and speed that is planned with [SI]."""
+LATEST_S: Final = 1e9
+"""Latest time that is planned with."""
+LIMIT_RANGE: Final = (1e-3, 1e3)
+"""Smallest and largest limit that is planned with [SI]."""
+LONGEST_CYCLE_S: Final = 10.0
+ROUNDING: Final = 1e-9
+
+
+class Result(StrEnum):
+    """What becomes of a motion."""
+
+    MOVING = "moving"
+    ARRIVED = "arrived"
+    SLOWING = "slowing"
+    """Faster than the limit: braking to it first."""
+    GOAL_TOO_FAST = "goal too fast"
+    """A velocity at the goal is above its limit: braking to rest instead."""
+    INVALID = "invalid"
+    """A number is none or out of range: nothing is planned, and zero is commanded."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlanarState:
+    """Where a body is and how it moves, in a fixed frame.
+
+    Attributes:
+        x: [m].
+        y: to the left of x [m].
+        heading: counter-clockwise from x [rad].
+        vx: velocity along x [m/s].
+        vy: velocity along y [m/s].
+        rate: of the heading [rad/s].
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    heading: float = 0.0
+    vx: float = 0.0
+    vy: float = 0.0
+    rate: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class PlanarLimits:
+    """The highest speed [m/s], acceleration [m/s2], rate of the heading [rad/s] and its acceleration [rad/s2]."""
+
+    speed: float
+    acceleration: float
+    rate: float
+    angular_acceleration: float
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerance:
+    """How far a body may be from its plan before a new one is made."""
+
+    distance_m: float = 0.01
+    speed_m_s: float = 0.05
+    heading_rad: float = 0.02
+    rate_rad_s: float = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A motion from a state to a goal.
+
+    Attributes:
+        result: MOVING, SLOWING, or why there is no way to the goal.
+        began: time at its start [s].
+        start: state at its start.
+        goal: where it leads; the heading the shorter way round.
+        allowed: limits given.
+        limits: limits in force; accelerations are lower where place or heading waits for the other.
+        way: of the place.
+        turn: of the heading.
+    """
+
+    result: Result
+    began: float
+    start: PlanarState
+    goal: PlanarState
+    allowed: PlanarLimits
+    limits: PlanarLimits
+    way: Way
+    turn: AxisPlan
+
+    @property
+    def ends(self) -> float:
+        """Time of arrival [s]."""
+        return self.began + max(self.way.duration, self.turn.duration)
+
+    def at(self, now: float) -> PlanarState:
+        """The state planned for a time [s]; after the end the goal's velocity is held."""
+        time = max(0.0, now - self.began)
+        dx, dy, vx, vy = self.way.at(time)
+        turned, rate = self.turn.at(time)
+        start = self.start
+        return PlanarState(start.x + dx, start.y + dy, start.heading + turned, vx, vy, rate)
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """What to do for the next cycle, and why.
+
+    Attributes:
+        result: what becomes of the motion.
+        case: arc in force, as "bend" or "cruise".
+        acceleration_m_s2: to apply over the cycle, x and y of the fixed frame.
+        angular_acceleration_rad_s2: to apply over the cycle.
+        next: state planned for the end of the cycle.
+        eta_s: time left.
+        limits: in force.
+        plan: that was followed: the given one, or a new one if the body was off its plan.
+    """
+
+    result: Result
+    case: str
+    acceleration_m_s2: tuple[float, float]
+    angular_acceleration_rad_s2: float
+    next: PlanarState
+    eta_s: float
+    limits: PlanarLimits
+    plan: Plan
+
+
+def plan_motion(start: PlanarState, goal: PlanarState, limits: PlanarLimits, now: float = 0.0) -> Plan:
+    """The fastest motion from a state to a goal, or a plan whose result says why there is none.
+
+    Args:
+        start: state now.
+        goal: place, heading and velocity to reach.
+        limits: to keep.
+        now: time [s].
+    """
+    if not _plannable(start, goal, limits, now):
+        return _nothing(goal, limits)
+    fast = math.hypot(goal.vx, goal.vy) > limits.speed * (1 + ROUNDING) or abs(goal.rate) > limits.rate * (1 + ROUNDING)
+    way, turn = _to_rest(start, limits) if fast else _together(start, goal, limits)
+    strongest = max((abs(acceleration) for duration, acceleration in turn.pieces if duration), default=0.0)
+    in_force = replace(limits, acceleration=way.acceleration, angular_acceleration=strongest)
+    return Plan(Result.GOAL_TOO_FAST if fast else Result.MOVING, now, start, goal, limits, in_force, way, turn)
+
+
+def follow(
+    plan: Plan,
+    now: float,
+    state: PlanarState,
+    dt: float,
+    tolerance: Tolerance = Tolerance(),
+) -> Step:
+    """What to do for the next cycle; a body that is off its plan gets a new one to the same goal.
+
+    Args:
+        plan: to follow.
+        now: time [s].
+        state: measured now.
+        dt: length of the cycle [s].
+        tolerance: how far from the plan a body is still on it.
+    """
+    if not (0.0 < dt <= LONGEST_CYCLE_S and abs(now) <= LATEST_S):
+        plan = _nothing(plan.goal, plan.allowed)
+        return Step(plan.result, "none", (0.0, 0.0), 0.0, plan.start, 0.0, plan.limits, plan)
+    here = plan.at(now)
+    if plan.result is Result.INVALID or not _near(here, state, tolerance):
+        plan = plan_motion(state, plan.goal, plan.allowed, now)
+        here = plan.at(now)
+    there = plan.at(now + dt)
+    return Step(
+        _result(plan, here, now),
+        plan.way.case(now - plan.began),
+        ((there.vx - here.vx) / dt, (there.vy - here.vy) / dt),
+        (there.rate - here.rate) / dt,
+        there,
+        max(0.0, plan.ends - now),
+        plan.limits,
+        plan,
+    )
+
+
+def _plannable(start: PlanarState, goal: PlanarState, limits: PlanarLimits, now: float) -> bool:
+    low, high = LIMIT_RANGE
+    return (
+        all(abs(number) <= FARTHEST for number in (*astuple(start), *astuple(goal)))
+        and all(low <= limit <= high for limit in astuple(limits))
+        and abs(now) <= LATEST_S
+    )
+
+
+def _nothing(goal: PlanarState, limits: PlanarLimits) -> Plan:
+    way = planner_way.braking((0.0, 0.0), 1.0, 1.0)
+    return Plan(Result.INVALID, 0.0, PlanarState(), goal, limits, limits, way, AxisPlan(0.0, ()))
+
+
+def _to_rest(start: PlanarState, limits: PlanarLimits) -> tuple[Way, AxisPlan]:
+    way = planner_way.braking((start.vx, start.vy), limits.speed, limits.acceleration)
+    return way, planner_axis.braking(start.rate, limits.angular_acceleration)
+
+
+def _together(start: PlanarState, goal: PlanarState, limits: PlanarLimits) -> tuple[Way, AxisPlan]:
+    """Way and turn of the same duration: the faster one is slowed down.
+
+    Not every duration is possible for a turn that begins and ends moving; one with a rest in it can take any
+    duration from its shortest on.
+    """
+    travel, end = (goal.x - start.x, goal.y - start.y), (goal.vx, goal.vy)
+    begin = start.vx, start.vy
+    turn = math.remainder(goal.heading - start.heading, math.tau), start.rate, goal.rate
+    turn_limits = limits.rate, limits.angular_acceleration
+    fastest = planner_way.fastest(travel, begin, end, limits.speed, limits.acceleration)
+    shortest = planner_axis.fastest(*turn, *turn_limits).duration
+    way = planner_way.lasting(fastest, travel, begin, end, shortest)
+    matched = planner_axis.in_time(*turn, *turn_limits, way.duration)
+    if matched is None:
+        rested = planner_axis.with_a_rest(*turn, *turn_limits, way.duration)
+        way = planner_way.lasting(fastest, travel, begin, end, rested.duration)
+        matched = planner_axis.with_a_rest(*turn, *turn_limits, way.duration)
+    return way, matched
+
+
+def _near(planned: PlanarState, state: PlanarState, tolerance: Tolerance) -> bool:
+    return (
+        math.hypot(state.x - planned.x, state.y - planned.y) <= tolerance.distance_m
+        and math.hypot(state.vx - planned.vx, state.vy - planned.vy) <= tolerance.speed_m_s
+        and abs(state.heading - planned.heading) <= tolerance.heading_rad
+        and abs(state.rate - planned.rate) <= tolerance.rate_rad_s
+    )
+
+
+def _result(plan: Plan, here: PlanarState, now: float) -> Result:
+    if plan.result is not Result.MOVING:
+        return plan.result
+    if math.hypot(here.vx, here.vy) > plan.limits.speed * (1 + ROUNDING) or abs(here.rate) > plan.limits.rate * (
+        1 + ROUNDING
+    ):
+        return Result.SLOWING
+    return Result.ARRIVED if now >= plan.ends else Result.MOVING

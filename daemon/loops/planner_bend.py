@@ -1,0 +1,145 @@
+"""Motions in the plane without a cruise: two straight changes of velocity, and the optimal bend near them.
+
+Units as in planner_arcs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Final
+
+from daemon.loops.planner_arcs import Bend, Ramp, Vector, ramp_between
+
+ROUNDING: Final = 1e-12
+STRAIGHT: Final = 1e-9
+"""Below this length of the shortest costate, relative to the duration, a bend is two straight changes of velocity."""
+TRIALS: Final = 40
+
+
+def corner(travel: Vector, start: Vector, end: Vector) -> Vector | None:
+    """The velocity between two straight changes of velocity that cover the travel, however high it is."""
+    (px, py), (ax, ay), (bx, by) = travel, start, end
+
+    def missing(x: float, y: float) -> Vector:
+        first, last = math.hypot(x - ax, y - ay), math.hypot(bx - x, by - y)
+        return px - ((ax + x) * first + (bx + x) * last) / 2, py - ((ay + y) * first + (by + y) * last) / 2
+
+    way = math.hypot(px, py)
+    root = math.sqrt(way) or 1.0
+    return solve_pair(missing, (px / root, py / root), ROUNDING * (way + math.hypot(ax, ay, bx, by) ** 2), root + 1.0)
+
+
+def ramps(start: Vector, end: Vector, via: Vector) -> list[Ramp]:
+    """Two straight changes of velocity."""
+    return [ramp_between(start, via), ramp_between(via, end)]
+
+
+def bend(travel: Vector, start: Vector, end: Vector, via: Vector) -> Bend | None:
+    """The bend that covers the travel; None if there is none, or none that differs from a straight line.
+
+    The first guess takes the linear costate that points along the two straight changes of velocity at their middles.
+
+    Args:
+        travel: displacement to the goal.
+        start: velocity at the start.
+        end: velocity at the goal.
+        via: the corner.
+    """
+    fx, fy, lx, ly = via[0] - start[0], via[1] - start[1], end[0] - via[0], end[1] - via[1]
+    first, duration = math.hypot(fx, fy), math.hypot(fx, fy) + math.hypot(lx, ly)
+    turn, change = fx * ly - fy * lx, math.hypot(lx - fx, ly - fy)
+    if abs(turn) <= STRAIGHT * change * change or start == end:
+        return None
+    scale = duration / 2 / (change * change)
+    shortest, begin = abs(turn) * scale, (fx * (lx - fx) + fy * (ly - fy)) * scale - first / 2
+    side = math.copysign(1.0, turn)
+
+    def missing(u0: float, u1: float) -> Vector:
+        if not -MOST < u0 < u1 < MOST:
+            return math.inf, math.inf
+        arc = bend_between(start, end, side, u0, u1)
+        x, y, _, _ = arc.at(arc.duration)
+        return travel[0] - x, travel[1] - y
+
+    guess = math.asinh(begin / shortest), math.asinh((begin + duration) / shortest)
+    ends = solve_pair(missing, guess, ROUNDING * (math.hypot(*travel) + duration * duration), 1.5)
+    return bend_between(start, end, side, *ends) if ends else None
+
+
+MOST: Final = 40.0
+"""Highest |u| of a bend: there its costate is 1e17 times longer than at its shortest."""
+
+
+def bend_between(start: Vector, end: Vector, side: float, u0: float, u1: float) -> Bend:
+    """The bend from u0 to u1, scaled and turned so that it leads from one velocity to the other."""
+    along = 2 * math.sinh((u0 - u1) / 2) * math.sinh((u0 + u1) / 2)
+    across = side * (u1 - u0)
+    length = along * along + across * across
+    x, y = end[0] - start[0], end[1] - start[1]
+    shortest = math.hypot(x, y) / math.sqrt(length)
+    scale = 1.0 / (shortest * length)
+    direction = (x * along + y * across) * scale, (y * along - x * across) * scale
+    return Bend(shortest * (math.sinh(u1) - math.sinh(u0)), start, direction, side, shortest, u0)
+
+
+def top_speed(arc: Bend) -> float:
+    """The highest speed within a bend: where speed stops to rise between two of its samples, by bisection."""
+    samples = [arc.duration * k / SAMPLES for k in range(SAMPLES + 1)]
+    rises = [_speed_rises(arc, time) for time in samples]
+    tops = [samples[0], samples[-1]]
+    for low, high, rose, rises_still in zip(samples, samples[1:], rises, rises[1:], strict=False):
+        if rose and not rises_still:
+            for _ in range(20):
+                middle = (low + high) / 2
+                low, high = (middle, high) if _speed_rises(arc, middle) else (low, middle)
+            tops.append(low)
+    return max(math.hypot(*arc.at(time)[2:]) for time in tops)
+
+
+SAMPLES: Final = 16
+
+
+def _speed_rises(arc: Bend, time: float) -> bool:
+    """Whether velocity and costate point the same way."""
+    s = arc.shortest * math.sinh(arc.begin) + time
+    c, n = arc.direction
+    d = arc.side * arc.shortest
+    _, _, vx, vy = arc.at(time)
+    return vx * (-s * c - d * n) + vy * (d * c - s * n) > 0
+
+
+def solve_pair(
+    missing: Callable[[float, float], Vector], guess: Vector, tolerance: float, longest: float
+) -> Vector | None:
+    """The two numbers for which nothing is missing: Newton's method, its steps halved until they help.
+
+    Args:
+        missing: what is missing with two numbers; infinite where they are not allowed.
+        guess: the first two numbers.
+        tolerance: what may be missing.
+        longest: step allowed.
+
+    Returns:
+        The numbers; None if it does not converge.
+    """
+    (x, y), (rx, ry) = guess, missing(*guess)
+    for _ in range(TRIALS):
+        error = math.hypot(rx, ry)
+        if error <= tolerance:
+            return x, y
+        h = 1e-7 * (1 + abs(x) + abs(y))
+        (ax, ay), (bx, by) = missing(x + h, y), missing(x, y + h)
+        xx, yx, xy, yy = (rx - ax) / h, (ry - ay) / h, (rx - bx) / h, (ry - by) / h
+        determinant = xx * yy - xy * yx
+        if determinant == 0.0 or not math.isfinite(determinant):
+            return None
+        dx, dy = (rx * yy - ry * xy) / determinant, (xx * ry - yx * rx) / determinant
+        factor = min(1.0, longest / (math.hypot(dx, dy) or 1.0))
+        while factor > 1e-3:
+            rx, ry = missing(x + factor * dx, y + factor * dy)
+            if math.hypot(rx, ry) < error:
+                break
+            factor /= 2
+        x, y = x + factor * dx, y + factor * dy
+    return None
