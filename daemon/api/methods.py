@@ -274,7 +274,7 @@ _CONFIG = (
     Method(
         "config.diff",
         "Compare the settings of a drive.",
-        (_NODE, _SETTINGS),
+        (_NODE, _SETTINGS, _PRODUCT),
         "node, name, compared, differences, notes",
         Role.WATCH,
     ),

@@ -49,8 +49,9 @@ def diff(node: Node, file: Path | None = None, /, *, options: Options = DEFAULT)
         file: DCF file.
     """
     with options.client() as client:
-        number = _number_of(client.status(), node)
-        found = client.call("config.diff", node=number, values=_values(_text(file), number))
+        number, text = _number_of(client.status(), node), _text(file)
+        values, product = _values(text, number), _product(text)
+        found = client.call("config.diff", node=number, values=values, product_code=product)
     _tell(found["notes"])
     show(found["differences"], _changes, options.json)
     say(f"{len(found['differences'])} of {found['compared']} settings differ")
@@ -210,7 +211,7 @@ def _changes(rows: Sequence[dict[str, Any]]) -> Table:
 def _words(row: dict[str, Any], key: str) -> str:
     """A value with its unit or its meaning."""
     entry = OBJECTS.find(row["object"])
-    return "-" if row[key] is None or entry is None else value_words(entry, row[key])
+    return "-" if entry is None else value_words(entry, row[key])
 
 
 def _files(rows: Sequence[dict[str, Any]]) -> Table:

@@ -24,6 +24,8 @@ from drivers.epos.parameters import (
 )
 
 OUTPUT_MASK = OBJECTS["digital_output_functions_mask"]
+BASE_SETTINGS = frozenset(entry for entry in SETTINGS if entry.firmware == "2011h")
+"""Those that every drive has."""
 HARDWARE_SHIFT = 16
 """The hardware version stands in the high word of the product code."""
 
@@ -80,10 +82,12 @@ class ConfigCommands:
         drive = self._drive(params["node"])
         wanted, notes = self._wanted(drive, params["values"])
         async with Commissioning(drive) as commissioning:
+            notes += _require_kind(drive, await commissioning.identity(), params["product_code"])
             found = await commissioning.read()
-        differences = self._changes(drive, wanted, found)
+        target, more = _target(drive, wanted, found)
+        differences = self._changes(drive, target, found)
         return {"node": drive.node, "name": drive.name, "compared": len(wanted), "differences": differences,
-                "notes": notes}  # fmt: skip
+                "notes": more + notes}  # fmt: skip
 
     # --- changing ------------------------------------------------------------------------------------------------
 
@@ -104,10 +108,11 @@ class ConfigCommands:
             found = await commissioning.read()
             target, more = _target(drive, wanted, found)
             changes = self._changes(drive, target, found)
-            if not dry_run:
+            writes = not dry_run and bool(changes or save)
+            if writes:
                 _require_saved(drive, target, found, save)
                 await self._write(commissioning, target, found, save)
-        if not dry_run:
+        if writes:
             await until_ready(drive, self._supervisor.master.network.boot_deadline_s + 1.0)
         return {
             "node": drive.node,
@@ -116,7 +121,7 @@ class ConfigCommands:
             "changes": changes,
             "saved": save and not dry_run,
             "restarted": save and not dry_run,
-            "notes": notes + more,
+            "notes": more + notes,
             "node_state": str(drive.node_state),
             "status": drive.status_sentence,
         }
@@ -145,27 +150,36 @@ class ConfigCommands:
             else:
                 wanted[entry] = _fitting(entry, value)
         notes = [f"{others} objects are no settings of an EPOS 24/5 and were left out"] if others else []
+        given = sum(entry in BASE_SETTINGS for entry in wanted)
+        if given < len(BASE_SETTINGS):
+            notes.append(
+                f"{given} of the {len(BASE_SETTINGS)} settings of an EPOS 24/5 were given (is the file whole?)"
+            )
         return without_unmapped(wanted), notes
 
-    def _changes(self, drive: EposDrive, wanted: Values, found: Values) -> list[dict[str, Any]]:
-        """Every difference for people and programs."""
+    def _changes(self, drive: EposDrive, target: Values, found: Values) -> list[dict[str, Any]]:
+        """Every difference for people and programs; the outputs of brakes are none, they stay as they are."""
+        brakes = drive.outputs.own_bits
+        wanted = dict(target)
+        if OUTPUT_MASK in wanted:
+            wanted[OUTPUT_MASK] = wanted[OUTPUT_MASK] & ~brakes | found[OUTPUT_MASK] & brakes
         profile = expected_settings(drive.config, self._supervisor.master.network)
         return [
             {
                 "object": entry.address,
                 "name": entry.name,
-                "was": found.get(entry),
+                "was": found[entry],
                 "wanted": value,
                 "unit": entry.unit,
                 "note": _note(entry, value, profile),
             }
             for entry, value in wanted.items()
-            if found.get(entry) != value
+            if found[entry] != value
         ]
 
 
 def _target(drive: EposDrive, wanted: Values, found: Values) -> tuple[Values, list[str]]:
-    """What can be written of it: nothing that the drive lacks, not its addressing, not the brakes' outputs."""
+    """What can be written of it: nothing that the drive lacks, not its addressing, the brakes' outputs idle."""
     absent = [entry for entry in wanted if entry not in found]
     kept = [entry for entry in ADDRESSING if wanted.get(entry, found[entry]) != found[entry]]
     notes = [f"{_words(entry)} is absent in this drive's firmware and was left out" for entry in absent]
@@ -198,8 +212,8 @@ def _require_kind(drive: EposDrive, identity: Mapping[str, int], product_code: i
         raise Refused(
             f"{drive.who} is product 0x{code:08X}, the settings are of product 0x{product_code:08X}",
             node=drive.node,
-            value=code,
-            limit=product_code,
+            value=f"0x{code:08X}",
+            limit=f"0x{product_code:08X}",
             remedy="take the settings of a drive of the same hardware",
         )
     return [f"the settings are of product 0x{product_code:08X}, this drive is 0x{code:08X}: another firmware"]

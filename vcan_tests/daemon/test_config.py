@@ -15,7 +15,8 @@ from profiles.loader import load
 from profiles.schema import Gains
 from vcan_tests.robot import Robot, running_robot
 
-MOTOR_TYPE, ACCELERATION, HOMING = "0x6402", "0x6083", "0x2080"
+MOTOR_TYPE, ACCELERATION, HOMING, OUTPUT_MASK = "0x6402", "0x6083", "0x2080", "0x2078/2"
+BOTH = ("config.apply", "config.restore")
 
 
 def twin(robot: Robot, node: int) -> SimulatedEpos:
@@ -45,6 +46,10 @@ async def until_idle(robot: Robot) -> None:
 
 def by_object(result: dict[str, Any], key: str = "changes") -> dict[str, dict[str, Any]]:
     return {change["object"]: change for change in result[key]}
+
+
+async def diff(robot: Robot, node: int, values: dict[str, int] | None = None, **params: Any) -> dict[str, Any]:
+    return await robot.call("config.diff", node=node, values=values, **({"product_code": None} | params))
 
 
 async def backup(robot: Robot, node: int) -> dict[str, int]:
@@ -79,7 +84,7 @@ async def test_wrong_motor_data_is_told_and_mended_in_one_command() -> None:
         twin(robot, 2).dictionary.commission({"motor_type": 1, "position_sensor_type": 2})
         robot.network.power_on("all")
         await robot.until(lambda: robot.app.devices.by_node[2].node_state.value == "refused")
-        differences = by_object(await robot.call("config.diff", node=2, values=None), "differences")
+        differences = by_object(await diff(robot, 2), "differences")
         assert (differences[MOTOR_TYPE]["was"], differences[MOTOR_TYPE]["wanted"]) == (1, 11)
         assert (differences["0x2210/2"]["was"], differences["0x2210/2"]["wanted"]) == (2, 1)
         await change(robot, node=2, save=True)
@@ -160,6 +165,53 @@ async def test_settings_of_another_hardware_are_refused() -> None:
             await change(robot, node=1, values={HOMING: 650}, product_code=0x6410_2011)
 
 
+async def test_a_comparison_with_the_settings_of_another_hardware_is_refused_like_writing_them() -> None:
+    async with running_robot() as robot:
+        with pytest.raises(Refused, match="product 0x64102011") as refused:
+            await diff(robot, 1, {HOMING: 650}, product_code=0x6410_2011)
+        assert (refused.value.value, refused.value.limit) == ("0x62102011", "0x64102011")
+
+
+async def test_a_file_that_was_cut_short_is_told_when_it_is_compared_and_when_it_is_applied() -> None:
+    async with running_robot() as robot:
+        whole = await backup(robot, 1)
+        half = dict(list(whole.items())[:40])
+        told = "40 of the 96 settings of an EPOS 24/5 were given (is the file whole?)"
+        assert (await diff(robot, 1, half))["notes"] == [told]
+        assert (await change(robot, node=1, values=half, dry_run=True))["notes"] == [told]
+        assert (await diff(robot, 1, whole))["notes"] == []
+
+
+@pytest.mark.parametrize("node", [1, 2])
+async def test_right_after_a_dump_comparing_applying_and_restoring_agree_that_nothing_is_to_be_written(
+    node: int,
+) -> None:
+    async with running_robot() as robot:
+        old = await backup(robot, node)
+        previews = [await change(robot, method, node=node, values=old, dry_run=True) for method in BOTH]
+        assert (await diff(robot, node, old))["differences"] == []
+        assert [preview["changes"] for preview in previews] == [[], []]
+
+
+async def test_applying_what_a_drive_has_already_does_not_take_it_out_of_operation() -> None:
+    async with running_robot() as robot:
+        old = await backup(robot, 1)
+        result = await change(robot, node=1, values=old)
+        assert (result["changes"], result["status"]) == ([], "node 1 (rear_right) is ready")
+        assert not [event for event in robot.app.supervisor.log.last(9) if "left operation" in event["message"]]
+
+
+async def test_the_outputs_beside_those_of_a_brake_are_compared_and_written() -> None:
+    async with running_robot() as robot:
+        old = await backup(robot, 1)
+        wanted = old | {OUTPUT_MASK: 1 << 13}
+        found = by_object(await diff(robot, 1, wanted), "differences")
+        assert (found[OUTPUT_MASK]["was"], found[OUTPUT_MASK]["wanted"]) == (1 << 12, 1 << 12 | 1 << 13)
+        await change(robot, node=1, values=wanted)
+        await until_idle(robot)
+        assert twin(robot, 1).dictionary.number("digital_output_functions_mask") == 1 << 12 | 1 << 13
+
+
 async def test_settings_that_the_profile_decides_are_marked() -> None:
     async with running_robot() as robot:
         preview = await change(robot, node=1, values={ACCELERATION: 1}, dry_run=True)
@@ -223,7 +275,7 @@ async def test_a_drive_that_goes_away_while_it_is_changed_is_told_and_comes_back
             await change(robot, node=1, values={HOMING: 650, ACCELERATION: 7}, save=True)
         robot.network.power_on(1)
         await until_idle(robot)
-        assert not (await robot.call("config.diff", node=1, values=None))["differences"]
+        assert not (await diff(robot, 1))["differences"]
 
 
 async def test_gains_that_the_profile_gives_are_written_at_each_boot_and_the_others_left_alone() -> None:
@@ -234,18 +286,18 @@ async def test_gains_that_the_profile_gives_are_written_at_each_boot_and_the_oth
     async with running_robot(replace(profile, drives=drives)) as robot:
         values = await backup(robot, 2)
         assert (values["0x60F9/1"], values["0x60F9/2"], values["0x60F6/1"]) == (1500, 0, 0)
-        assert not (await robot.call("config.diff", node=2, values=None))["differences"]
+        assert not (await diff(robot, 2))["differences"]
 
 
 @pytest.mark.parametrize("node", [1, 2, 3, 4])
 async def test_after_its_boot_a_drive_is_what_the_profile_expects(node: int) -> None:
     async with running_robot() as robot:
-        found = await robot.call("config.diff", node=node, values=None)
+        found = await diff(robot, node)
         assert (found["compared"] > 30, found["differences"]) == (True, [])
 
 
 @pytest.mark.parametrize("node", [1, 3])
 async def test_settings_are_read_over_a_serial_line_as_over_can(node: int) -> None:
     async with running_robot(bus="rs232") as robot, asyncio.timeout(30.0):
-        found = await robot.call("config.diff", node=node, values=None)
+        found = await diff(robot, node)
         assert (len(await backup(robot, node)), found["differences"]) == (96, [])
