@@ -35,6 +35,7 @@ def dump(node: Node, file: Path, /, *, options: Options = DEFAULT) -> None:
     Args:
         file: File to write.
     """
+    _require_folder(file)
     with options.client() as client:
         show([_save(client.call("config.dump", node=node_of(node)), file)], _files, options.json)
 
@@ -93,6 +94,7 @@ def backup(folder: Path, node: Node = "all", /, *, options: Options = DEFAULT) -
     Args:
         folder: Folder to write to; it is made where it does not exist.
     """
+    _make_folder(folder)
     with options.client() as client:
         drives = client.call("config.backup", node=node_of(node))["drives"]
     show([_save(drive, folder / _file_name(drive["node"])) for drive in drives], _files, options.json)
@@ -167,6 +169,23 @@ def _product(text: EdsText | None) -> int | None:
     return text.number("DeviceInfo", "ProductNumber") if text else None
 
 
+def _require_folder(file: Path) -> None:
+    """Raise ConfigError where the folder of a file is missing: it may be a slip of the pen."""
+    if not file.parent.is_dir():
+        raise ConfigError(f"there is no folder {file.parent} for {file.name}", remedy=f"mkdir -p {file.parent}")
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _not_written(folder, error) from None
+
+
+def _not_written(path: Path, error: OSError) -> ConfigError:
+    return ConfigError(f"{path} cannot be written ({error.strerror})", remedy="choose another place")
+
+
 def _save(drive: dict[str, Any], file: Path) -> dict[str, Any]:
     """Write the settings of one drive; what was written, for people."""
     found = {parse_address(text): value for text, value in drive["values"].items()}
@@ -175,10 +194,9 @@ def _save(drive: dict[str, Any], file: Path) -> dict[str, Any]:
     commissioning = Commissioning(drive["node"], drive["name"], drive["bit_rate"])
     device = EPOS_24_5.with_product(drive["product_code"])
     try:
-        file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(make_dcf(entries, device, commissioning, values), encoding="utf-8")
     except OSError as error:
-        raise ConfigError(f"{file} cannot be written ({error.strerror})", remedy="choose another place") from None
+        raise _not_written(file, error) from None
     return {"node": drive["node"], "name": drive["name"], "file": str(file), "settings": len(values)}
 
 

@@ -105,6 +105,22 @@ def test_a_backup_is_a_file_a_drive_and_restores_it_in_one_command(backend: Conf
     assert (method, sent["dry_run"], len(sent["values"])) == ("config.restore", False, 3)
 
 
+def test_a_dump_makes_no_folder_and_says_how_to(
+    backend: ConfigBackend, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("config", "dump", 1, tmp_path / "none" / "x.dcf") == 7
+    assert capsys.readouterr().err.endswith(f"for x.dcf - mkdir -p {tmp_path / 'none'}\n")
+    assert (list(tmp_path.glob("none")), backend.asked) == ([], [])
+
+
+def test_a_backup_into_what_is_no_folder_is_refused_before_drives_are_asked(
+    backend: ConfigBackend, tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("")
+    assert run("config", "backup", tmp_path / "file") == 7
+    assert backend.asked == []
+
+
 def test_restoring_shows_the_writes_and_wants_a_word_of_consent(
     backend: ConfigBackend, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
