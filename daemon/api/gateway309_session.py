@@ -17,7 +17,7 @@ from daemon.api.gateway309_help import HELP
 from daemon.api.gateway309_lss import LssCommands
 from daemon.api.gateway309_text import Lss, Nmt, Read, Refusal, Request, Set, Tell, Write, parse_request
 from daemon.api.gateway309_types import print_value
-from daemon.runtime.interlocks import require_all_disabled, require_write_allowed
+from daemon.runtime.interlocks import require_all_disabled, require_reach_allowed, require_write_allowed
 from daemon.runtime.supervisor import Supervisor
 from drivers.canopen.sdo import ABORT_OUT_OF_MEMORY, ABORT_TIMEOUT
 
@@ -99,6 +99,7 @@ class Session:
             raise GatewayError(ErrorNumber.NOT_SUPPORTED, self._read_only)
 
     async def _read(self, node: int, command: Read) -> str:
+        require_reach_allowed(self._supervisor, node)
         data = await self._supervisor.master.sdo(node).read_raw((command.index, command.sub), self._timeout_s)
         return print_value(data, command.datatype)
 

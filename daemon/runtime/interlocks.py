@@ -25,6 +25,19 @@ def require_all_disabled(supervisor: Supervisor) -> None:
         )
 
 
+def require_reach_allowed(supervisor: Supervisor, node: int) -> None:
+    """Raise Interlock where asking a node would hold up those of the vehicle while a drive has power.
+
+    A gateway on a serial line waits for a node that does not answer, and forwards nothing meanwhile.
+    """
+    strange = node not in supervisor.devices.by_node
+    if strange and not supervisor.master.network.synchronous and supervisor.powered:
+        raise Interlock(
+            f"node {node} is not in the profile: over a serial line a node that does not answer holds up all others",
+            remedy="ask it at rest: `canhelm stop`, then `canhelm motor disable`",
+        )
+
+
 def require_write_allowed(supervisor: Supervisor, node: int, index: int, value: int) -> None:
     """Raise Interlock where writing an object would get round an interlock.
 
@@ -33,6 +46,7 @@ def require_write_allowed(supervisor: Supervisor, node: int, index: int, value: 
         index: the object.
         value: what would be written, as an unsigned number.
     """
+    require_reach_allowed(supervisor, node)
     device = supervisor.devices.by_node.get(node)
     if device is None:
         return

@@ -6,7 +6,7 @@ from typing import Any
 
 from canhelm.errors import Aborted, UsageError
 from daemon.runtime.handlers import Handler, Params, node_number
-from daemon.runtime.interlocks import require_all_disabled, require_write_allowed
+from daemon.runtime.interlocks import require_all_disabled, require_reach_allowed, require_write_allowed
 from daemon.runtime.supervisor import Supervisor
 from drivers.canopen.codes import NmtCommand
 from drivers.canopen.objects import ObjectDef, ObjectTable, parse_address
@@ -69,6 +69,7 @@ class NetworkCommands:
     async def _sdo_read(self, params: Params, lease: str | None) -> dict[str, Any]:
         node = node_number(self._supervisor, params["node"])
         wanted = self._object(node, str(params["object"]))
+        require_reach_allowed(self._supervisor, node)
         client = self._supervisor.master.sdo(node)
         if isinstance(wanted, ObjectDef):
             try:

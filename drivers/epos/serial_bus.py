@@ -94,8 +94,15 @@ class SerialGatewayBus(Bus):
         self._readings = Readings(gateway, encoders, self._submit, self._receive)
         self._toggles: dict[int, int] = {}
         self._spoke_s: dict[int, float] = {}
+        self._guarded_s: dict[int, float] = {}
+        self._guarding: set[int] = set()
         self._probed: set[int] = set()
         self._reconnecting: asyncio.TimerHandle | None = None
+
+    @property
+    def trouble(self) -> BusOff | None:
+        """Why the line does not work, with what mends it; None while it does."""
+        return self.line.trouble if self.line is not None else None
 
     async def open(self) -> None:
         """Open the line. Raises BusOff where its device is missing."""
@@ -142,8 +149,8 @@ class SerialGatewayBus(Bus):
             "exchanges": counters.exchanges,
             "resyncs": counters.resyncs,
             "line_retries": self.line.retries,
-            "silent_nodes": sorted(self.silent),
-            "line_down": str(self.line.down) if self.line.down else None,
+            "silent_nodes": sorted(self.silent & self._readings.states.keys()),
+            "line_down": str(self.line.trouble) if self.line.trouble else None,
             **self._facts,
         }
 
@@ -161,7 +168,8 @@ class SerialGatewayBus(Bus):
         if can_id & RTR_FLAG:
             self._ask_state(node, deadline_s)
         elif function == 0x600:
-            if node in self.silent:
+            if node in self.silent or node not in self._spoke_s:
+                self._guard_before_waiting()
                 self._probed.add(node)
             self._bridge(node).take(data, deadline_s)
         elif can_id == 0x000:
@@ -207,7 +215,7 @@ class SerialGatewayBus(Bus):
                 self._receive(0x580 + node, data)
 
             bridge = self._bridges[node] = SdoBridge(
-                node, self.line, table, self._long_transfers, answer, self._on_silence
+                node, self.line, table, self._long_transfers, answer, self._on_failure
             )
         return bridge
 
@@ -217,13 +225,39 @@ class SerialGatewayBus(Bus):
         """Guard a node.
 
         The gateway cannot be guarded: that it has just answered stands for it. The same holds for the others while the
-        line is kept by a request to a node that is silent.
+        line is kept by a request to a node that may be dead; they are asked right after it.
         """
-        if node == self.gateway or self._probed:
+        if node == self.gateway:
             self._answer_from_memory(node)
         elif node not in self.silent:
-            request = make_request_can_frame(0x700 + node, 1)
-            self._submit(request, node, deadline_s, lambda data: self._state_of(node, data[0] & 0x7F), urgent=True)
+            self._guarded_s[node] = asyncio.get_running_loop().time()
+            if self._probed:
+                self._answer_from_memory(node)
+                self._guard(node, math.inf)
+            else:
+                self._guard(node, deadline_s)
+
+    def _guard(self, node: int, deadline_s: float) -> None:
+        """Send one guard request, unless one waits already."""
+        if node in self._guarding:
+            return
+        self._guarding.add(node)
+        request = make_request_can_frame(0x700 + node, 1)
+        self._submit(
+            request,
+            node,
+            deadline_s,
+            lambda data: self._state_of(node, data[0] & 0x7F),
+            then=lambda: self._guarding.discard(node),
+            urgent=True,
+        )
+
+    def _guard_before_waiting(self) -> None:
+        """A node that may be dead keeps the line: those that are guarded are asked once more before."""
+        recently_s = asyncio.get_running_loop().time() - MEMORY_S
+        for node, asked_s in self._guarded_s.items():
+            if asked_s > recently_s and node not in self.silent:
+                self._guard(node, math.inf)
 
     def _answer_from_memory(self, node: int) -> None:
         loop = asyncio.get_running_loop()
@@ -258,7 +292,7 @@ class SerialGatewayBus(Bus):
                 if take is not None:
                     take(result.data)
             elif isinstance(result, Answer) and result.error in SILENT:
-                self._on_silence(node)
+                self._on_failure(node, True)
                 if self.on_silent is not None:
                     self.on_silent(node)
             elif not isinstance(result, BusOff):
@@ -275,9 +309,10 @@ class SerialGatewayBus(Bus):
         self.silent.discard(node)
         self._probed.discard(node)
 
-    def _on_silence(self, node: int) -> None:
+    def _on_failure(self, node: int, silent: bool) -> None:
+        """A transfer failed: because the node is silent, or because the line failed, which says nothing of the node."""
         self._probed.discard(node)
-        if node != self.gateway:
+        if silent and node != self.gateway:
             self.silent.add(node)
 
     def _receive(self, can_id: int, data: bytes) -> None:

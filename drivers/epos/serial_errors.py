@@ -88,6 +88,22 @@ def lost(request: bytes, line: str) -> Timeout:
     return Timeout(message, **_where(request), remedy=f"read it back before you do it again; {cable}")
 
 
+def deaf(line: str, baud: int) -> BusOff:
+    """Nothing at all comes from the line."""
+    return BusOff(
+        f"the drive on {line} does not answer",
+        remedy=f"is it switched on, is the cable in place, and is its baud rate (0x2002) {baud}?",
+    )
+
+
+def garbage(line: str, baud: int) -> BusOff:
+    """What comes from the line makes no sense."""
+    return BusOff(
+        f"nothing understandable comes from {line} at {baud} baud",
+        remedy="try another baud rate (--bus rs232:DEVICE@38400 is the factory's); look at the cable and its ground",
+    )
+
+
 def queue_full(request: bytes, line: str) -> NotReady:
     """Too many requests wait for the line."""
     message = f"too many requests wait for {line}: {request_words(request)} was not sent"

@@ -23,6 +23,8 @@ from drivers.epos.serial_handshake import Exchange, Handshake, Outcome
 QUEUE_DEPTH = 64
 MAX_TRIES = 3
 REQUEST_TIMEOUT_S = 3.0
+VAIN = 2
+"""Exchanges in a row without an answer after which the line, and no node, is to blame."""
 
 _NOT_CARRIED_OUT = frozenset((Outcome.NOT_READY, Outcome.REFUSED, Outcome.UNHEARD))
 _RESTARTS = (129, 130)
@@ -60,6 +62,7 @@ class SerialLine:
         retries: requests that were sent again.
         late_answers: answers to requests whose deadline had passed.
         failures: requests that failed; an abort code of a node is an answer.
+        vain: exchanges in a row that were not answered.
     """
 
     def __init__(
@@ -76,6 +79,8 @@ class SerialLine:
         self.retries = 0
         self.late_answers = 0
         self.failures = 0
+        self.vain = 0
+        self._heard_bytes = 0
         self._loop = asyncio.get_running_loop()
         self._urgent: deque[_Job] = deque()
         self._others: deque[_Job] = deque()
@@ -92,6 +97,15 @@ class SerialLine:
     def crc_errors(self) -> int:
         """Damaged answers."""
         return self._talk.exchange.crc_errors
+
+    @property
+    def trouble(self) -> BusOff | None:
+        """Why nothing is to be had from this line, as far as it is known; None while it works."""
+        if self.down is not None or self.vain < VAIN:
+            return self.down
+        if self.counters.received_bytes > self._heard_bytes:
+            return serial_errors.garbage(self.name, self.baud)
+        return serial_errors.deaf(self.name, self.baud)
 
     def load(self) -> float:
         """Share of the last second that bytes of either direction kept the line busy, 0 to 1."""
@@ -186,6 +200,10 @@ class SerialLine:
     def _on_end(self, outcome: Outcome) -> None:
         """An exchange has ended, and the line is free."""
         job, self._job = self._job, None
+        if outcome is Outcome.ANSWERED:
+            self.vain, self._heard_bytes = 0, self.counters.received_bytes
+        else:
+            self.vain += 1
         try:
             if job is not None:
                 self._conclude(job, outcome)

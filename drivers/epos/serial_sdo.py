@@ -11,7 +11,7 @@ import struct
 from collections.abc import Callable, Coroutine
 from typing import Any
 
-from canhelm.errors import Aborted, CanhelmError
+from canhelm.errors import Aborted, CanhelmError, Timeout
 from drivers.canopen.objects import ObjectTable
 from drivers.epos.serial_answers import Answer
 from drivers.epos.serial_frames import (
@@ -39,7 +39,8 @@ class SdoBridge:
         table: the node's object dictionary, which tells an object's length.
         long_transfers: held by a transfer in segments, as the gateway keeps only one at a time.
         answer: takes each SDO answer of the node, 8 bytes.
-        on_silence: called when the node did not answer the gateway, or the line failed; the master then waits in vain.
+        on_failure: called with the node when it did not answer the gateway (True) or the line failed (False); the
+            master then waits in vain.
     """
 
     def __init__(
@@ -49,14 +50,14 @@ class SdoBridge:
         table: ObjectTable,
         long_transfers: asyncio.Lock,
         answer: Callable[[bytes], None],
-        on_silence: Callable[[int], None],
+        on_failure: Callable[[int, bool], None],
     ) -> None:
         self._node = node
         self._line = line
         self._table = table
         self._long_transfers = long_transfers
         self._answer = answer
-        self._on_silence = on_silence
+        self._on_failure = on_failure
         self._address = (0, 0)
         self._value = b""
         self._left = 0
@@ -137,11 +138,17 @@ class SdoBridge:
             return
         size = 4 - (command >> 2 & 3) if command & 1 else 4
 
+        request, again = make_write_object(self._node, index, sub, value[:size]), True
+
         def done(result: Answer | CanhelmError) -> None:
-            if not self._failed(result):
+            nonlocal again
+            if again and isinstance(result, Timeout):
+                again = False  # the same value once more does no harm, whether the first one arrived or not
+                self._line.submit(request, done, deadline_s)
+            elif not self._failed(result):
                 self._answer(_HEAD.pack(0x60, index, sub, b""))
 
-        self._line.submit(make_write_object(self._node, index, sub, value[:size]), done, deadline_s)
+        self._line.submit(request, done, deadline_s)
 
     def _take_segment(self, data: bytes, deadline_s: float) -> None:
         toggle = data[0] & 0x10
@@ -177,7 +184,7 @@ class SdoBridge:
         if code == 0:
             return False
         if not isinstance(code, int) or code in SILENT:
-            self._on_silence(self._node)
+            self._on_failure(self._node, code in SILENT)
         else:
             self._answer(_ABORT.pack(0x80, *self._address, code))
         return True

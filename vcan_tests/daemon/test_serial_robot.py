@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from canhelm.errors import CanhelmError
+from canhelm.errors import CanhelmError, Interlock
 from drivers.epos.serial_plan import (
     plan,
     serial_limits,
@@ -21,6 +21,8 @@ from profiles.loader import load
 from vcan_tests.robot import Robot, running_robot
 
 MAX2D = load("max2d").profile
+ANSWER_TO_A_WRITE = 7
+"""Bytes of such an answer behind its operation code."""
 
 
 async def test_it_boots_and_steers_to_within_a_degree() -> None:
@@ -131,3 +133,43 @@ def test_the_same_rate_leaves_the_limits_as_they_are() -> None:
     shrunk = serial_limits(MAX2D.limits, 2.0, 0.01, 0.005)
     assert shrunk.speed_m_s == MAX2D.limits.speed_m_s
     assert shrunk.steering_rim_speed_m_s == MAX2D.limits.steering_rim_speed_m_s
+
+
+async def test_asking_a_node_that_is_not_there_at_rest_costs_no_other_its_guarding() -> None:
+    async with running_robot(bus="rs232", expect_errors=True) as robot:
+        with pytest.raises(CanhelmError):
+            await robot.call("sdo.read", node=99, object="0x1000")
+        await asyncio.sleep(2.0)
+        assert robot.state == "idle"
+        assert robot.app.bus.details()["silent_nodes"] == []
+
+
+async def test_a_node_outside_the_profile_is_not_asked_while_a_drive_has_power() -> None:
+    async with running_robot(bus="rs232") as robot:
+        driving = await _at_speed(robot, 0.3)
+        with pytest.raises(Interlock, match="node 99 is not in the profile"):
+            await robot.call("sdo.read", node=99, object="0x1000")
+        assert not driving.done()
+        await robot.call("stop")
+        with pytest.raises(CanhelmError):
+            await driving
+
+
+async def test_one_lost_answer_does_not_break_a_write_off() -> None:
+    async with running_robot(bus="rs232") as robot:
+        assert robot.app.wire.cable is not None
+        to_host = robot.app.wire.cable.to_host
+        written = asyncio.create_task(robot.call("sdo.write", node=3, object="profile_acceleration", value=4000))
+        deliver = to_host.send
+        lost: list[bytes] = []
+
+        def lose_one_answer(data: bytes, at_s: float) -> float:
+            if len(data) == ANSWER_TO_A_WRITE and not lost:
+                lost.append(data)
+                return at_s
+            return deliver(data, at_s)
+
+        to_host.send = lose_one_answer  # type: ignore[method-assign]
+        assert (await written)["value"] == 4000
+        assert lost
+        assert robot.state == "idle"

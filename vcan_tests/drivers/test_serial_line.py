@@ -441,3 +441,31 @@ async def test_a_write_over_a_noisy_line_is_carried_out_at_most_once() -> None:
             await line.request(make_write_object(1, 0x2000 + turn, 0, b"\x01"))
     writes = [request for request in drive.carried_out if isinstance(request, WriteObject)]
     assert len(writes) == len(set(writes))
+
+
+# Who is to blame
+
+
+async def test_a_line_that_stays_silent_is_to_blame_itself() -> None:
+    line = a_line(Scripted())
+    for _ in range(2):
+        with pytest.raises(Timeout):
+            await line.request(make_read_object(1, 0x6041, 0))
+    assert "does not answer" in str(line.trouble)
+
+
+async def test_a_line_that_brings_garbage_is_probably_at_another_baud_rate() -> None:
+    line = a_line(Scripted(*[b"\x93\x07"] * 20))
+    for _ in range(2):
+        with pytest.raises(Timeout):
+            await line.request(make_read_object(1, 0x6041, 0))
+    assert "nothing understandable" in str(line.trouble)
+    assert "another baud rate" in str(line.trouble)
+
+
+async def test_a_line_that_answers_again_is_no_trouble() -> None:
+    unheard, unheard_again, filler = b"", b"", b""
+    line = a_line(Scripted(unheard, unheard_again, filler, *READ_OK))
+    await line.request(make_read_object(1, 0x6041, 0))
+    assert line.retries == 2
+    assert line.trouble is None
