@@ -1,9 +1,12 @@
-"""One axis from a position and speed to others, in the shortest time or in a given one: a double integrator, exactly."""
+"""One axis from a position and speed to others, in the shortest time or in a given one: a double integrator, exact."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
+
+ROUNDING: Final = 1e-14
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +52,8 @@ def fastest(travel: float, start: float, end: float, limit: float, acceleration:
         acceleration: the highest acceleration [unit/s2], positive.
     """
     direct = (start + end) / 2 * abs(end - start) / acceleration
+    if abs(travel - direct) <= ROUNDING * (start * start + end * end) / acceleration:
+        return _by_peak(start, end, end, acceleration, 0.0)
     side = math.copysign(1.0, travel - direct)
     free_peak = math.sqrt(max(0.0, side * acceleration * travel + (start * start + end * end) / 2))
     if free_peak <= limit:

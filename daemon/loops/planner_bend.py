@@ -27,7 +27,9 @@ def corner(travel: Vector, start: Vector, end: Vector) -> Vector | None:
 
     way = math.hypot(px, py)
     root = math.sqrt(way) or 1.0
-    return solve_pair(missing, (px / root, py / root), ROUNDING * (way + math.hypot(ax, ay, bx, by) ** 2), root + 1.0)
+    tolerance = ROUNDING * (way + math.hypot(ax, ay, bx, by) ** 2)
+    guesses = (px / root, py / root), (-(ax + bx) / 2, -(ay + by) / 2)
+    return next(filter(None, (solve_pair(missing, guess, tolerance, root + 1.0) for guess in guesses)), None)
 
 
 def ramps(start: Vector, end: Vector, via: Vector) -> list[Ramp]:

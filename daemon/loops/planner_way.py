@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from typing import Final
 
 from daemon.loops.planner_arcs import Arc, Place, Ramp, Vector, ramp_between
-from daemon.loops.planner_paths import fastest_way
+from daemon.loops.planner_paths import fastest_way, stop_and_go
 
 AT_ONCE: Final = 1e-9
 """Difference of two durations, relative to them, that counts as none."""
+TRIALS: Final = 45
 GENTLEST: Final = 1e-12
 """Smallest part of the acceleration that is tried to make a way last longer."""
 
@@ -98,6 +99,8 @@ def braking(start: Vector, speed: float, acceleration: float) -> Way:
 def lasting(way: Way, travel: Vector, start: Vector, end: Vector, duration: float) -> Way:
     """The way with an acceleration so low that it lasts as long as asked for, or the next longer duration there is.
 
+    Regula falsi on the logarithms of acceleration and duration; every third trial halves, as the duration may jump.
+
     Args:
         way: the fastest way.
         travel, start, end: of the way, as in `fastest`.
@@ -105,26 +108,31 @@ def lasting(way: Way, travel: Vector, start: Vector, end: Vector, duration: floa
     """
     if way.duration >= duration:
         return way
-    high, low, slow = 1.0, 1.0, way
+    quick, slow = way, way
     while slow.duration < duration:
-        high, low = low, low / 4
-        if low < GENTLEST:
-            return _waiting(way, duration)
-        slow = fastest(travel, start, end, way.speed, way.acceleration * low)
-    while slow.duration > duration * (1 + AT_ONCE) and high - low > 1e-14 * high:
-        middle = (low + high) / 2
-        trial = fastest(travel, start, end, way.speed, way.acceleration * middle)
-        if trial.duration >= duration:
-            low, slow = middle, trial
-        else:
-            high = middle
+        if slow.acceleration < way.acceleration * GENTLEST:
+            return _with_a_rest(way, travel, start, end, duration)
+        quick, slow = slow, fastest(travel, start, end, way.speed, slow.acceleration / 4)
+    for trial in range(TRIALS):
+        if slow.duration <= duration * (1 + AT_ONCE):
+            break
+        excess = math.log(slow.duration / duration) - AT_ONCE / 2
+        part = 0.5 if trial % 3 == 2 else excess / math.log(slow.duration / (quick.duration or slow.duration / 2))
+        between = slow.acceleration * (quick.acceleration / slow.acceleration) ** part
+        middle = fastest(travel, start, end, way.speed, between)
+        quick, slow = (quick, middle) if middle.duration >= duration else (middle, slow)
     return slow
 
 
-def _waiting(way: Way, duration: float) -> Way:
-    """The way, and rest after it: for a way of next to no length, which begins and ends at rest."""
-    rest = Ramp((duration - way.duration) * way.acceleration / way.speed, (0.0, 0.0))
-    return _way(way.shape, way.speed, way.acceleration, way.places[0][2:], [*way.arcs, rest])
+def _with_a_rest(way: Way, travel: Vector, start: Vector, end: Vector, duration: float) -> Way:
+    """Brake, rest, go: for a way that hardly has to change, which no acceleration makes last."""
+    speed, acceleration = way.speed, way.acceleration
+    length = speed * speed / acceleration
+    raw = start[0] / speed, start[1] / speed
+    brake, *onward = stop_and_go((travel[0] / length, travel[1] / length), raw, (end[0] / speed, end[1] / speed))
+    unrested = math.fsum(arc.duration for arc in (brake, *onward))
+    rest = Ramp(max(0.0, duration * acceleration / speed - unrested), (0.0, 0.0))
+    return _way("stop and go", speed, acceleration, raw, [brake, rest, *onward])
 
 
 def _within(velocity: Vector, speed: float) -> Vector:
