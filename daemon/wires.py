@@ -21,7 +21,7 @@ from drivers.encoder.objects import OBJECTS as ENCODER_OBJECTS
 from drivers.epos.serial_bus import SerialGatewayBus
 from drivers.epos.serial_conversation import Transport
 from drivers.epos.serial_plan import facts, gateway_of, serial_profile
-from drivers.epos.serial_tty import SerialTty
+from drivers.epos.serial_tty import BAUD_RATES, SerialTty, require_serial_device
 from drivers.simulated.bus import SimulatedBus
 from drivers.simulated.network import SimulatedNetwork
 from drivers.simulated.serial import SimulatedSerial
@@ -31,7 +31,7 @@ from profiles.schema import Profile
 DEFAULT_BAUD = 115200
 READING_SHARE = 0.8
 """Of the longest cycle over a serial line, what its readings may take."""
-_RS232 = re.compile(r"rs232(?::(?P<device>[^@]+))?(?:@(?P<baud>\d+))?")
+_RS232 = re.compile(r"rs232(?P<colon>:(?P<device>[^@]*))?(?:@(?P<baud>.*))?")
 OnLost = Callable[[str], None]
 
 
@@ -76,10 +76,25 @@ def make_wire(spec: str, profile: Profile, seed: int) -> Wire:
     serial = _RS232.fullmatch(spec)
     if serial is None:
         return _can_wire(open_bus(spec, profile.network.bit_rate), profile)
-    baud = int(serial["baud"] or DEFAULT_BAUD)
-    if serial["device"]:
-        return _serial_wire(serial["device"], partial(_open_device, serial["device"], baud), profile, baud)
-    return _simulated_serial(profile, baud, seed)
+    baud = _baud(spec, serial["baud"])
+    if serial["colon"] is None:
+        return _simulated_serial(profile, baud, seed)
+    if not serial["device"]:
+        remedy = f"give rs232:/dev/ttyS0@{baud}, or rs232@{baud} for a simulated line"
+        raise UsageError(f"{spec!r} names no serial device", value=spec, remedy=remedy)
+    require_serial_device(serial["device"])
+    return _serial_wire(serial["device"], partial(_open_device, serial["device"], baud), profile, baud)
+
+
+def _baud(spec: str, text: str | None) -> int:
+    """The baud rate that stands behind the ``@``. Raises UsageError."""
+    if text is None:
+        return DEFAULT_BAUD
+    baud = int(text) if text.isascii() and text.isdecimal() else 0
+    if baud not in BAUD_RATES:
+        known = ", ".join(map(str, BAUD_RATES))
+        raise UsageError(f"{text!r} in {spec!r} is no baud rate of a serial line", value=spec, remedy=f"give {known}")
+    return baud
 
 
 def _can_wire(bus: Bus, profile: Profile) -> Wire:
@@ -92,10 +107,7 @@ def _can_wire(bus: Bus, profile: Profile) -> Wire:
 def _simulated_serial(profile: Profile, baud: int, seed: int) -> Wire:
     medium = SimulatedBus(bit_rate=profile.network.bit_rate, name="vcan0")
     network = SimulatedNetwork(profile, medium, seed)
-    try:
-        port = SimulatedSerial(network.drives[gateway_of(profile)], baud, seed=seed)
-    except ValueError as error:
-        raise UsageError(str(error), value=baud, remedy="give rs232@115200 or rs232@38400") from None
+    port = SimulatedSerial(network.drives[gateway_of(profile)], baud, seed=seed)
     return _serial_wire("rs232", partial(_open_cable, port.cable), profile, baud, network, medium, port.cable)
 
 

@@ -7,6 +7,7 @@ from drivers.bus.contract import Bus
 from drivers.bus.socketcan import SocketCanBus
 
 KERNEL = "socketcan"
+FORMS = "give INTERFACE:CHANNEL, such as socketcan:can0; rs232:/dev/ttyS0@115200 for a serial line; or simulated"
 
 
 def open_bus(spec: str, bit_rate: int) -> Bus:
@@ -21,7 +22,7 @@ def open_bus(spec: str, bit_rate: int) -> Bus:
     """
     interface, colon, channel = spec.partition(":")
     if not (interface and colon and channel):
-        raise UsageError(f"{spec!r} names no bus", value=spec, remedy="give INTERFACE:CHANNEL, such as socketcan:can0")
+        raise UsageError(f"{spec!r} names no bus", value=spec, remedy=FORMS)
     if interface == KERNEL:
         return SocketCanBus(channel, bit_rate)
     from drivers.bus.python_can import python_can_bus  # here, so that SocketCAN does not wait for python-can

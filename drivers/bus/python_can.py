@@ -35,6 +35,9 @@ SEND_TIMEOUT_S = 0.01
 OPTIONS: dict[str, dict[str, Any]] = {"slcan": {"timeout": 0.0}}
 """What interfaces need beside channel and bit rate: a serial port that does not wait for the next byte."""
 
+NO_CAN_INTERFACES = ("rs232", "simulated")
+"""What may be named in place of an interface, and is none of python-can's."""
+
 _GONE = {errno.ENETDOWN, errno.ENODEV, errno.ENXIO, errno.EIO, errno.EBADF}
 _ERROR_CLASS_BUS_OFF = 0x40  # linux/can/error.h
 
@@ -42,8 +45,10 @@ _ERROR_CLASS_BUS_OFF = 0x40  # linux/can/error.h
 def python_can_bus(interface: str, channel: str, bit_rate: int) -> PythonCanBus:
     """The bus of one of python-can's interfaces. Raises UsageError where it has no such interface."""
     if interface not in can.VALID_INTERFACES:
-        known = ", ".join(sorted(can.VALID_INTERFACES))
-        raise UsageError(f"there is no CAN interface {interface!r}", value=interface, remedy=f"use one of {known}")
+        known = sorted({*can.VALID_INTERFACES, *NO_CAN_INTERFACES})
+        small = interface.lower()
+        remedy = f"write {small}" if small in known else f"use one of {', '.join(known)}"
+        raise UsageError(f"there is no CAN interface {interface!r}", value=interface, remedy=remedy)
     return PythonCanBus(interface, channel, bit_rate)
 
 

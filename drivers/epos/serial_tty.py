@@ -7,16 +7,35 @@ import contextlib
 import errno
 import fcntl
 import os
+import stat
 import termios
 import tty
 from collections.abc import Callable
+from pathlib import Path
 
 from canhelm.errors import BusOff, UsageError
 
 BAUD_RATES = {rate: getattr(termios, f"B{rate}") for rate in (9600, 19200, 38400, 57600, 115200)}
 """Rates of object 0x2002 that a terminal has, too; 14400 bit/s it has not."""
+DEVICES = Path("/sys/dev/char")
+"""Where the kernel tells what kind of device a number is; pseudo terminals are not listed."""
 _READ_SIZE = 4096
 _IFLAG, _CFLAG, _ISPEED, _OSPEED = 0, 2, 4, 5
+
+
+def require_serial_device(path: str) -> None:
+    """Raise UsageError for what can never be a serial line; a device that is missing may still be plugged in."""
+    remedy = "give the path of a serial device, as rs232:/dev/ttyUSB0"
+    try:
+        found = os.stat(path)
+    except OSError:
+        if "/" in path:
+            return
+        remedy += "; `canhelm simulate --bus rs232:pty` prints that of a simulated one"
+        raise UsageError(f"{path!r} is no path of a device", value=path, remedy=remedy) from None
+    kind = DEVICES / f"{os.major(found.st_rdev)}:{os.minor(found.st_rdev)}" / "subsystem"
+    if not stat.S_ISCHR(found.st_mode) or (kind.exists() and kind.resolve().name != "tty"):
+        raise UsageError(f"{path} is no serial device", value=path, remedy=remedy)
 
 
 class SerialTty:

@@ -108,6 +108,19 @@ def test_a_specification_that_names_no_bus_is_refused(spec: str) -> None:
         open_bus(spec, BIT_RATE)
 
 
+def test_an_unknown_interface_is_told_what_else_there_is() -> None:
+    with pytest.raises(UsageError) as refused:
+        open_bus("pigeon:can0", BIT_RATE)
+    assert {"rs232", "simulated", "slcan", "socketcan"} <= set((refused.value.remedy or "").split(", "))
+
+
+@pytest.mark.parametrize("interface", ["rs232", "slcan"])
+def test_an_interface_in_capitals_is_told_how_it_is_written(interface: str) -> None:
+    with pytest.raises(UsageError) as refused:
+        open_bus(f"{interface.upper()}:/dev/ttyS0", BIT_RATE)
+    assert refused.value.remedy == f"write {interface}"
+
+
 def test_a_serial_port_gives_a_name_without_its_folder() -> None:
     assert open_bus("slcan:/dev/ttyUSB0", BIT_RATE).name == "ttyUSB0"
 

@@ -12,7 +12,7 @@ from canhelm.errors import BusOff, UsageError
 from drivers.epos.serial_conversation import SerialTiming
 from drivers.epos.serial_frames import make_read_object, make_write_object
 from drivers.epos.serial_line import SerialLine
-from drivers.epos.serial_tty import BAUD_RATES, SerialTty
+from drivers.epos.serial_tty import BAUD_RATES, SerialTty, require_serial_device
 from vcan_tests.drivers.serial_bench import Drive
 
 STATUSWORD = make_read_object(1, 0x6041, 0)
@@ -223,3 +223,16 @@ def test_a_rate_that_no_drive_has_is_refused() -> None:
 
 def test_the_rates_are_those_of_the_drive() -> None:
     assert list(BAUD_RATES) == [9600, 19200, 38400, 57600, 115200]
+
+
+@pytest.mark.parametrize(
+    ("path", "told"), [("/tmp", "no serial device"), ("/dev/null", "no serial device"), ("pty", "canhelm simulate")]
+)
+def test_what_can_never_be_a_serial_line_is_told_at_once(path: str, told: str) -> None:
+    with pytest.raises(UsageError, match=told):
+        require_serial_device(path)
+
+
+async def test_a_terminal_and_a_device_that_is_missing_may_be_waited_for(pty: Pty) -> None:
+    for path in (pty.device, "/dev/ttyUSB99"):
+        require_serial_device(path)

@@ -1,0 +1,42 @@
+"""What a bus SPEC means, and what is wrong with one that means nothing."""
+
+from __future__ import annotations
+
+import pytest
+
+from canhelm.errors import UsageError
+from daemon.wires import make_wire
+from profiles.loader import load
+
+MAX2D = load("max2d").profile
+
+
+@pytest.mark.parametrize("spec", ["rs232:/dev/ttyS9@abc", "rs232:/dev/ttyS9@", "rs232@7", "rs232:/dev/ttyS9@14400"])
+def test_a_baud_rate_that_is_none_is_named(spec: str) -> None:
+    with pytest.raises(UsageError, match="is no baud rate") as refused:
+        make_wire(spec, MAX2D, 0)
+    assert "115200" in (refused.value.remedy or "")
+
+
+@pytest.mark.parametrize("spec", ["rs232:", "rs232:@115200"])
+def test_a_device_that_is_left_out_is_told_with_both_meanings(spec: str) -> None:
+    with pytest.raises(UsageError, match="names no serial device") as refused:
+        make_wire(spec, MAX2D, 0)
+    assert refused.value.remedy == "give rs232:/dev/ttyS0@115200, or rs232@115200 for a simulated line"
+
+
+@pytest.mark.parametrize("spec", ["rs232:/tmp", "rs232:/dev/null", "rs232:pty"])
+def test_a_path_that_can_never_be_a_line_is_wrong_usage_at_once(spec: str) -> None:
+    with pytest.raises(UsageError, match=r"no serial device|no path of a device"):
+        make_wire(spec, MAX2D, 0)
+
+
+def test_a_device_that_is_missing_is_a_wire_all_the_same() -> None:
+    assert make_wire("rs232:/dev/ttyUSB99@38400", MAX2D, 0).bus.name == "/dev/ttyUSB99"
+
+
+@pytest.mark.parametrize("spec", ["Simulated", "can0"])
+def test_what_names_no_bus_is_told_every_form(spec: str) -> None:
+    with pytest.raises(UsageError, match="names no bus") as refused:
+        make_wire(spec, MAX2D, 0)
+    assert all(form in (refused.value.remedy or "") for form in ("socketcan:can0", "rs232:/dev/ttyS0", "simulated"))
