@@ -60,6 +60,8 @@ class Life:
             self._turn.clear()
             doubtful = await self._run_app(self.app)
         self._manager.close()
+        if self.app.supervisor.bus_missing:
+            return f"ended before {self.app.spec} could be opened: no drive was commanded"
         return _farewell(doubtful)
 
     def end(self) -> None:

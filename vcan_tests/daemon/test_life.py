@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -240,3 +241,15 @@ async def test_a_daemon_whose_bus_never_came_ends_in_order(monkeypatch: pytest.M
     await app.start()
     await asyncio.sleep(5.0)
     assert len(await app.close()) == 4
+
+
+async def test_the_last_words_of_a_daemon_without_a_bus_say_that_none_was_opened() -> None:
+    async def load_anew() -> Profile:
+        raise AssertionError
+
+    missing = "rs232:/dev/ttyUSB99"
+    life = Life(partial(App, bus=missing), load_anew, ServiceManager())
+    running = asyncio.create_task(life.run(load("max2d").profile))
+    await asyncio.sleep(3.0)
+    life.end()
+    assert await running == f"ended before {missing} could be opened: no drive was commanded"
