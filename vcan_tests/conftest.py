@@ -7,10 +7,14 @@ import contextlib
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
+import hypothesis
 import pytest
 
 from daemon.runtime.clock import VirtualTimeLoop
 from vcan_tests.awake import awake_processors
+
+hypothesis.settings.register_profile("canhelm", deadline=None)
+hypothesis.settings.load_profile("canhelm")
 
 NEEDS = {
     "vcan": [Path("/sys/class/net/vcan0"), Path("/sys/class/net/vcan1")],
