@@ -105,7 +105,7 @@ class Session:
 
     async def _write(self, node: int, command: Write) -> str:
         self._require_write()
-        require_write_allowed(self._supervisor, node, command.index, int.from_bytes(command.data, "little"))
+        require_write_allowed(self._supervisor, node, command.index)
         client = self._supervisor.master.sdo(node)
         await client.write_raw((command.index, command.sub), command.data, self._timeout_s)
         return "OK"

@@ -10,8 +10,6 @@ from canhelm.errors import Interlock
 from daemon.runtime.supervisor import Supervisor
 
 CONTROLWORD = 0x6040
-ENABLE_OPERATION = 0x000F
-"""Controlword bits that switch the power stage on (CiA 402, device control)."""
 LIFE_GUARDING = (0x100C, 0x100D)
 BRAKE_OUTPUTS = (0x2078, 0x2079)
 
@@ -38,13 +36,12 @@ def require_reach_allowed(supervisor: Supervisor, node: int) -> None:
         )
 
 
-def require_write_allowed(supervisor: Supervisor, node: int, index: int, value: int) -> None:
+def require_write_allowed(supervisor: Supervisor, node: int, index: int) -> None:
     """Raise Interlock where writing an object would get round an interlock.
 
     Args:
         node: its node; nodes that are no part of the vehicle are free.
         index: the object.
-        value: what would be written, as an unsigned number.
     """
     require_reach_allowed(supervisor, node)
     device = supervisor.devices.by_node.get(node)
@@ -52,8 +49,9 @@ def require_write_allowed(supervisor: Supervisor, node: int, index: int, value: 
         return
     require_all_disabled(supervisor)
     drive = device.name if device.name in supervisor.devices.drives else ""
-    if drive and index == CONTROLWORD and value & ENABLE_OPERATION == ENABLE_OPERATION:
-        _refuse(device.who, "is enabled by the daemon alone, under a lease", f"`canhelm motor enable {drive}`")
+    if drive and index == CONTROLWORD:
+        commands = f"`canhelm motor enable {drive}`, or disable, quick-stop, reset"
+        _refuse(device.who, "is switched by the daemon alone, under a lease", commands)
     if index in LIFE_GUARDING:
         _refuse(device.who, "is guarded as its profile says", "change `network` in the profile")
     brakes = [brake.name for brake in supervisor.devices.brakes.values() if brake.drive == drive]

@@ -92,7 +92,7 @@ class NetworkCommands:
                 remedy="`canhelm object list` shows what can be written",
             )
         value = _as_typed(wanted, params["value"])
-        require_write_allowed(self._supervisor, node, wanted.index, value if isinstance(value, int) else 0)
+        require_write_allowed(self._supervisor, node, wanted.index)
         try:
             await self._supervisor.master.sdo(node).write(wanted, value)
         except Aborted as error:

@@ -112,8 +112,8 @@ async def test_nothing_is_written_while_a_drive_is_enabled() -> None:
 
 
 FORBIDDEN = {
-    "[1] 4 w 0x6040 0 u16 0x000F": "is enabled by the daemon alone",
-    "[1] 4 w 0x6040 0 u16 0x001F": "is enabled by the daemon alone",
+    "[1] 4 w 0x6040 0 u16 0x000F": "is switched by the daemon alone",
+    "[1] 4 w 0x6040 0 u16 0x001F": "is switched by the daemon alone",
     "[1] 4 w 0x100C 0 u16 0": "is guarded as its profile says",
     "[1] 5 w 0x100D 0 u8 0": "is guarded as its profile says",
 }
