@@ -13,7 +13,18 @@ from profiles.provenance import FieldPath, Mistake, Node, dotted, place_of
 from profiles.schema import SCHEMA_VERSION
 
 REFERENCES = {"wheels": "drives", "encoders": "encoders", "brakes": "brakes"}
-"""Lists of names in ``vehicle`` and the part that defines the names."""
+"""Lists of names, or mappings by name, in ``vehicle`` and the part that defines the names."""
+NEEDED = {
+    "paired_steer": (
+        ("limits", "steering_rim_speed_m_s"),
+        ("limits", "heading_deg"),
+        ("simulation", "steering_inertia_kg_m2"),
+        ("simulation", "steering_friction_n_m"),
+        ("simulation", "brake_holding_torque_n_m"),
+    ),
+    "omni": (("limits", "yaw_rate_deg_s"), ("limits", "yaw_acceleration_deg_s2")),
+}
+"""What a type of vehicle needs, and others do not."""
 STRONG_OUTPUT = 4
 """DigOUT4 carries 1 A, the others 100 mA (maxon EPOS 24/5 Hardware Reference 6.3)."""
 FIRST_OUTPUT_BIT = 15
@@ -54,7 +65,9 @@ def findings(data: dict[str, Any]) -> Iterator[Finding]:
     yield from _version(data)
     yield from _node_ids(data)
     yield from _vehicle_names(data)
+    yield from _needed(data)
     yield from _brakes(data)
+    yield from _accelerometer(data)
     yield from _encoders(data)
     yield from _unused(data)
 
@@ -90,11 +103,11 @@ def _node_ids(data: dict[str, Any]) -> Iterator[Finding]:
 
 def _vehicle_names(data: dict[str, Any]) -> Iterator[Finding]:
     for key, kind in REFERENCES.items():
-        names = part(data, "vehicle").get(key)
-        names = names if isinstance(names, list) else []
+        given = part(data, "vehicle").get(key)
+        names = list(given) if isinstance(given, list | dict) else []
         known = _defined(data, kind)
         for index, name in enumerate(names):
-            path = ("vehicle", key, index)
+            path = ("vehicle", key, name if isinstance(given, dict) else index)
             if known is not None and name not in known:
                 yield _unknown(path, kind, name, known)
             elif name in names[:index]:
@@ -103,6 +116,26 @@ def _vehicle_names(data: dict[str, Any]) -> Iterator[Finding]:
 
 def _unknown(path: FieldPath, kind: str, name: Any, known: dict[str, Any]) -> Finding:
     return Finding(path, f"{kind} has no {name!r}", f"use one of: {', '.join(known) or f'({kind} is empty)'}")
+
+
+def _needed(data: dict[str, Any]) -> Iterator[Finding]:
+    kind = part(data, "vehicle").get("type")
+    for section, key in NEEDED.get(str(kind), ()):
+        if part(data, section) and key not in part(data, section):
+            what = f"is missing, a vehicle of type {kind} needs it"
+            yield Finding((section, key), what, f"write {key}: with a number")
+
+
+def _accelerometer(data: dict[str, Any]) -> Iterator[Finding]:
+    drive, drives = part(data, "accelerometer").get("drive"), _defined(data, "drives")
+    if not isinstance(drive, str) or drives is None:
+        return
+    path = ("accelerometer", "drive")
+    if drive not in drives:
+        yield _unknown(path, "drives", drive, drives)
+    elif part(drives, drive).get("analog_inputs") is not True:
+        remedy = f"write analog_inputs: true at drives.{drive}"
+        yield Finding(path, f"{drive} does not tell its analog inputs", remedy)
 
 
 def _brakes(data: dict[str, Any]) -> Iterator[Finding]:
@@ -156,6 +189,6 @@ def _unused(data: dict[str, Any]) -> Iterator[Finding]:
     for key, kind in REFERENCES.items():
         names = vehicle.get(key)
         for name in part(data, kind):
-            if isinstance(names, list) and name not in names:
+            if isinstance(names, list | dict) and name not in names:
                 what = f"is not named in vehicle.{key}"
                 yield Finding((kind, name), what, "the vehicle's motions do not use it", warning=True)

@@ -7,6 +7,7 @@ those are mended.
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -17,8 +18,10 @@ from profiles.checks import Finding, part
 from profiles.schema import (
     DriveConfig,
     EncoderConfig,
+    Geometry,
     Limits,
     Network,
+    OmniGeometry,
     PairedSteerGeometry,
     Part,
     SimulationConfig,
@@ -33,7 +36,11 @@ CURRENT_RATIO = 2.0
 """Output current limit over continuous current limit (Firmware Specification 14.1.57 recommends twice)."""
 BUS_SHARE = 0.7
 """Share of a cycle that SYNC and the PDOs may take; the rest is left to guarding, SDO and emergency messages."""
-RPDO_BYTES, TPDO_BYTES, ENCODER_BYTES = 6, 8, 4
+RPDO_BYTES, TPDO_BYTES, ENCODER_BYTES, ANALOG_BYTES = 6, 8, 4, 4
+OMNI_SHARE = 2.0
+"""Mass that an omni-wheel pushes along its direction, over its share of the mass: wheels that stand evenly about the
+robot have the best force in their own direction, sum of cos^2 = n/2, and each of n does 2/n of the work."""
+LEAST_DETERMINANT = 1e-3
 
 T = TypeVar("T", bound=Part)
 
@@ -43,7 +50,9 @@ class Load:
     """What one wheel has to move and to hold on to."""
 
     mass_kg: float
-    """Its share of the vehicle's mass."""
+    """What of the vehicle's mass it pushes."""
+    weight_n: float
+    """What of the vehicle's weight it carries."""
     wheel_inertia_kg_m2: float
     friction: float
     rolling_resistance: float
@@ -52,7 +61,7 @@ class Load:
 def findings(data: dict[str, Any]) -> Iterator[Finding]:
     """Everything in a profile's plain data that physics, the drives or the bus do not allow."""
     limits = _valid(data.get("limits"), Limits)
-    vehicle = _valid(data.get("vehicle"), PairedSteerGeometry)
+    vehicle = _vehicle(data.get("vehicle"))
     simulation = _valid(data.get("simulation"), SimulationConfig)
     encoders = {name: _valid(value, EncoderConfig) for name, value in part(data, "encoders").items()}
     drives = {name: _valid(value, DriveConfig) for name, value in part(data, "drives").items()}
@@ -67,7 +76,8 @@ def findings(data: dict[str, Any]) -> Iterator[Finding]:
             yield from _drive(("drives", name), drive, supply_v, load)
             yield from _limits_of_drive(limits, drive, name)
     yield from _limits(limits, vehicle, encoders)
-    yield from _bus(_valid(data.get("network", {}), Network), len(drives), len(encoders))
+    analog = sum(drive is not None and drive.analog_inputs for drive in drives.values())
+    yield from _bus(_valid(data.get("network", {}), Network), len(drives), len(encoders), analog)
 
 
 def _valid(value: Any, kind: type[T]) -> T | None:
@@ -78,14 +88,21 @@ def _valid(value: Any, kind: type[T]) -> T | None:
         return None
 
 
-def _load(vehicle: PairedSteerGeometry | None, simulation: SimulationConfig | None) -> Load | None:
+def _vehicle(value: Any) -> Geometry | None:
+    kind = value.get("type") if isinstance(value, dict) else None
+    return _valid(value, OmniGeometry) if kind == OmniGeometry.type else _valid(value, PairedSteerGeometry)
+
+
+def _load(vehicle: Geometry | None, simulation: SimulationConfig | None) -> Load | None:
     if vehicle is None:
         return None
-    mass_kg = vehicle.mass_kg / len(vehicle.wheels)
+    share_kg = vehicle.mass_kg / len(vehicle.wheels)
+    pushed_kg = OMNI_SHARE * share_kg if isinstance(vehicle, OmniGeometry) else share_kg
+    weight_n = share_kg * GRAVITY_M_S2
     if simulation is None:
-        return Load(mass_kg, wheel_inertia_kg_m2=0.0, friction=math.inf, rolling_resistance=0.0)
+        return Load(pushed_kg, weight_n, wheel_inertia_kg_m2=0.0, friction=math.inf, rolling_resistance=0.0)
     tyre = simulation.tyre
-    return Load(mass_kg, simulation.wheel_inertia_kg_m2, tyre.friction, tyre.rolling_resistance)
+    return Load(pushed_kg, weight_n, simulation.wheel_inertia_kg_m2, tyre.friction, tyre.rolling_resistance)
 
 
 def max_speed_m_s(drive: DriveConfig, supply_v: float) -> float:
@@ -114,13 +131,10 @@ def moved_mass_kg(drive: DriveConfig, load: Load) -> float:
 
 
 def max_acceleration_m_s2(drive: DriveConfig, load: Load) -> float:
-    """Largest acceleration in m/s^2: motor force less rolling resistance, and no more than friction holds, mu g.
-
-    With all wheels driven each carries and pushes its own share of the weight, so that mass cancels out of mu m g / m.
-    """
-    rolling_n = load.rolling_resistance * load.mass_kg * GRAVITY_M_S2
+    """Largest acceleration in m/s^2: motor force less rolling resistance, and no more than friction holds."""
+    rolling_n = load.rolling_resistance * load.weight_n
     by_motor = (rim_force_n(drive) - rolling_n) / moved_mass_kg(drive, load)
-    return max(0.0, min(by_motor, load.friction * GRAVITY_M_S2))
+    return max(0.0, min(by_motor, _by_friction_m_s2(load)))
 
 
 def max_deceleration_m_s2(drive: DriveConfig, load: Load) -> float:
@@ -128,7 +142,12 @@ def max_deceleration_m_s2(drive: DriveConfig, load: Load) -> float:
 
     Rolling resistance and the gear's losses help to brake and are left as reserve.
     """
-    return min(rim_force_n(drive) / moved_mass_kg(drive, load), load.friction * GRAVITY_M_S2)
+    return min(rim_force_n(drive) / moved_mass_kg(drive, load), _by_friction_m_s2(load))
+
+
+def _by_friction_m_s2(load: Load) -> float:
+    """What friction holds: mu g where each wheel pushes its own share of the mass, which then cancels out."""
+    return load.friction * load.weight_n / load.mass_kg
 
 
 def _drive(path: tuple[str, str], drive: DriveConfig, supply_v: float, load: Load | None) -> Iterator[Finding]:
@@ -157,12 +176,15 @@ def _limits_of_drive(limits: Limits | None, drive: DriveConfig, name: str) -> It
 
 
 def _limits(
-    limits: Limits | None, vehicle: PairedSteerGeometry | None, encoders: dict[str, EncoderConfig | None]
+    limits: Limits | None, vehicle: Geometry | None, encoders: dict[str, EncoderConfig | None]
 ) -> Iterator[Finding]:
     if limits is None:
         return
     wheel_m_s = limits.wheel_speed_m_s
     yield from _at_most(("limits", "speed_m_s"), limits.speed_m_s, wheel_m_s, "m/s", "the wheels' limit is")
+    if isinstance(vehicle, OmniGeometry):
+        yield from _omni_limits(limits, vehicle)
+        return
     path = ("limits", "steering_rim_speed_m_s")
     yield from _at_most(path, limits.steering_rim_speed_m_s, wheel_m_s, "m/s", "the wheels' limit is")
     if vehicle is not None and limits.heading_deg >= vehicle.max_heading_deg:
@@ -174,17 +196,42 @@ def _limits(
         yield Finding(("limits", "heading_tolerance_deg"), what, "write one count or more")
 
 
+def _omni_limits(limits: Limits, vehicle: OmniGeometry) -> Iterator[Finding]:
+    """Speed and turn together may not ask a wheel for more than its limit."""
+    yield from _omni_wheels(vehicle)
+    lever_m = max(abs(wheel.lever_m) for wheel in vehicle.wheels.values())
+    left_m_s = max(0.0, limits.wheel_speed_m_s - limits.speed_m_s)
+    if lever_m > 0.0:
+        allowed = math.degrees(left_m_s / lever_m)
+        reason = "what the wheels' limit leaves beside the speed is"
+        yield from _at_most(("limits", "yaw_rate_deg_s"), limits.yaw_rate_deg_s, allowed, "deg/s", reason)
+
+
+def _omni_wheels(vehicle: OmniGeometry) -> Iterator[Finding]:
+    """The wheels must determine the robot's motion: det(M^T M) > 0 with rows (cos, sin, lever over the mean lever)."""
+    wheels = vehicle.wheels.values()
+    mean_m = sum(abs(wheel.lever_m) for wheel in wheels) / len(wheels) or 1.0
+    angles = [math.radians(wheel.direction_deg) for wheel in wheels]
+    levers = [wheel.lever_m / mean_m for wheel in wheels]
+    columns = ([math.cos(angle) for angle in angles], [math.sin(angle) for angle in angles], levers)
+    (a, b, c), (_, d, e), (_, _, f) = ([sum(map(operator.mul, one, other)) for other in columns] for one in columns)
+    if a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d) < LEAST_DETERMINANT:
+        what = "leave a motion of the robot undetermined"
+        yield Finding(("vehicle", "wheels"), what, "check their directions and the signs of their levers")
+
+
 def _worst_frame_bits(data_bytes: int) -> int:
     """Longest base frame with stuff bits and interframe space (ISO 11898-1; 34 of its 47 fixed bits are stuffed)."""
     return 47 + 8 * data_bytes + (33 + 8 * data_bytes) // 4
 
 
-def _bus(network: Network | None, drives: int, encoders: int) -> Iterator[Finding]:
-    """SYNC, one RPDO and one TPDO a drive and one TPDO an encoder have to fit into their share of a cycle."""
+def _bus(network: Network | None, drives: int, encoders: int, analog: int) -> Iterator[Finding]:
+    """SYNC, one RPDO and one TPDO a drive, one more where it tells analog inputs, and one an encoder have to fit."""
     if network is None:
         return
     bits = _worst_frame_bits(0) + encoders * _worst_frame_bits(ENCODER_BYTES)
     bits += drives * (_worst_frame_bits(RPDO_BYTES) + _worst_frame_bits(TPDO_BYTES))
+    bits += analog * _worst_frame_bits(ANALOG_BYTES)
     allowed = BUS_SHARE * network.bit_rate / bits
     yield from _at_most(("network", "cycle_hz"), network.cycle_hz, allowed, "Hz", "the bit rate allows")
 

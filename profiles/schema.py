@@ -10,7 +10,7 @@ Frames and signs: x forward, y left, angles counter-clockwise positive, a wheel'
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import msgspec
 from msgspec import Meta
@@ -126,6 +126,8 @@ class DriveConfig(Part, frozen=True, kw_only=True):
     """Difference between demanded and actual position at which the drive faults (object 0x6065)."""
     gains: Gains | None = None
     """Regulator gains; None: as they are in the drive."""
+    analog_inputs: bool = False
+    """Whether the drive tells the voltages at its analog inputs 1 and 2 in each cycle (TPDO2)."""
 
     @property
     def qc_per_motor_turn(self) -> int:
@@ -169,10 +171,26 @@ class BrakeConfig(Part, frozen=True, kw_only=True):
     close_time_s: NotNegative
 
 
-class PairedSteerGeometry(Part, frozen=True, kw_only=True):
+class AccelerometerConfig(Part, frozen=True, kw_only=True):
+    """An accelerometer with two axes in the robot's plane, each a voltage at an analog input of a drive."""
+
+    drive: str
+    """Name of the drive: axis x goes to its analog input 1, axis y to input 2."""
+    x_m: float
+    """Where it is mounted, forward of the robot's centre."""
+    y_m: float
+    """Where it is mounted, to the left of the robot's centre."""
+    rotation_deg: float = 0.0
+    """Direction of its x axis in the robot's frame, counter-clockwise positive."""
+    sensitivity_mv_per_m_s2: Positive
+    zero_mv: Annotated[float, Meta(ge=0, le=5000)]
+    """Voltage without acceleration."""
+
+
+class PairedSteerGeometry(Part, frozen=True, kw_only=True, tag_field="type", tag="paired_steer"):
     """Geometry and body of a four-wheel robot whose wheels steer in pairs (MAX2D thesis, chapter 4)."""
 
-    type: Literal["paired_steer"] = "paired_steer"
+    type: ClassVar[str] = "paired_steer"
     mass_kg: Positive
     wheelbase_m: Positive
     """l: distance between the steering axes of the rear and the front pair."""
@@ -194,19 +212,46 @@ class PairedSteerGeometry(Part, frozen=True, kw_only=True):
     centre_of_mass_height_m: NotNegative = 0.0
 
 
+class OmniWheelGeometry(Part, frozen=True, kw_only=True):
+    """Where an omni-wheel rolls; it touches the floor at the foot of the perpendicular from the robot's centre."""
+
+    direction_deg: float
+    """Direction of rolling in the robot's frame, counter-clockwise positive."""
+    lever_m: float
+    """Distance of the rolling line from the centre; positive where it rolls counter-clockwise about the centre."""
+
+
+class OmniGeometry(Part, frozen=True, kw_only=True, tag_field="type", tag="omni"):
+    """Geometry and body of a robot on three or more omni-wheels (Turtle robot's report, appendix A)."""
+
+    type: ClassVar[str] = "omni"
+    mass_kg: Positive
+    yaw_inertia_kg_m2: Positive
+    centre_of_mass_height_m: NotNegative = 0.0
+    wheels: Annotated[dict[Name, OmniWheelGeometry], Meta(min_length=3)]
+    """By the names of their drives, in the order of the loops."""
+
+
+Geometry = PairedSteerGeometry | OmniGeometry
+
+
 class Limits(Part, frozen=True, kw_only=True):
     """What the vehicle may do; the gate before encoding enforces it."""
 
     speed_m_s: Positive
     """Of the vehicle's centre."""
     acceleration_m_s2: Positive
+    """Of the vehicle's centre."""
     wheel_speed_m_s: Positive
-    steering_rim_speed_m_s: Positive
+    steering_rim_speed_m_s: Positive = 0.1
     """Rim speed of the wheels while a pair turns."""
-    heading_deg: Positive
+    heading_deg: Positive = 45.0
     """Steering heading that commands may ask for (within the stops)."""
     heading_tolerance_deg: Positive = 0.2
     """A pair counts as steered when it is closer to its target than this."""
+    yaw_rate_deg_s: Positive = 45.0
+    """Rate of turn of a vehicle that can turn on the spot."""
+    yaw_acceleration_deg_s2: Positive = 45.0
 
 
 class Tyre(Part, frozen=True, kw_only=True):
@@ -223,22 +268,48 @@ class Tyre(Part, frozen=True, kw_only=True):
     """Coefficient of rolling resistance."""
 
 
+class FloorPatch(Part, frozen=True, kw_only=True):
+    """A piece of floor with a friction of its own, for a time."""
+
+    shape: Literal["rectangle", "ellipse"] = "rectangle"
+    """Of equal length and width: a square, a circle."""
+    x_m: float
+    """Middle, in the frame where the robot starts at the origin."""
+    y_m: float
+    length_m: Positive
+    """Along x."""
+    width_m: Positive
+    """Along y."""
+    friction: NotNegative
+    """Coefficient of friction between tyre and floor on it."""
+    from_s: NotNegative = 0.0
+    """Time of the simulation at which it appears."""
+    until_s: Positive | None = None
+    """Time at which it is gone; None: it stays."""
+
+
 class SimulationConfig(Part, frozen=True, kw_only=True):
     """What only the simulated network needs to know."""
 
     tyre: Tyre
     supply_voltage_v: Annotated[float, Meta(ge=11, le=24)] = 24.0
     wheel_inertia_kg_m2: Positive
-    steering_inertia_kg_m2: Positive
+    steering_inertia_kg_m2: Positive = 0.01
     """Of one wheel pair about its steering axes, wheels and coupling belt together."""
-    steering_friction_n_m: NotNegative
+    steering_friction_n_m: NotNegative = 0.0
     """Dry friction of one pair's steering axes and coupling belt."""
-    brake_holding_torque_n_m: Positive
-    """Torque at which an engaged steering brake slips."""
+    brake_holding_torque_n_m: Positive = 10.0
+    """Torque at which an engaged brake slips."""
+    roller_resistance: Annotated[float, Meta(ge=0, lt=1)] = 0.0
+    """Coefficient of rolling resistance of an omni-wheel's rollers, against motion across the wheel."""
+    accelerometer_noise_m_s2: NotNegative = 0.0
+    """Standard deviation of one reading of the accelerometer."""
+    floor: dict[Name, FloorPatch] = {}
+    """Patches of another friction than the tyre's, the last one on top; for omni-wheels."""
 
 
 class Profile(Part, frozen=True, kw_only=True):
-    """A robot: network, drives, encoders, brakes, vehicle, limits, simulation."""
+    """A robot: network, drives, encoders, brakes, accelerometer, vehicle, limits, simulation."""
 
     schema_version: int
     name: Name
@@ -248,7 +319,8 @@ class Profile(Part, frozen=True, kw_only=True):
     drives: Annotated[dict[Name, DriveConfig], Meta(min_length=1)]
     encoders: dict[Name, EncoderConfig] = {}
     brakes: dict[Name, BrakeConfig] = {}
-    vehicle: PairedSteerGeometry | None = None
+    accelerometer: AccelerometerConfig | None = None
+    vehicle: Geometry | None = None
     limits: Limits
     simulation: SimulationConfig | None = None
 

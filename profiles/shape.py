@@ -23,7 +23,7 @@ class Shape:
     def walk(self, node: Node, kind: inspect.Type, path: FieldPath = ()) -> Any:
         """The plain value of ``node`` without unknown keys; wrong values stay in and are listed as mistakes."""
         if isinstance(kind, inspect.UnionType):
-            kind = _member(node, kind)
+            kind = self._member(node, kind, path)
         if isinstance(kind, inspect.StructType):
             return self._struct(node, kind, path)
         if isinstance(kind, inspect.DictType):
@@ -43,13 +43,31 @@ class Shape:
         fields = {field.encode_name: field for field in kind.fields}
         if not isinstance(node, Mapping):
             return self._not_a(node, path, f"a mapping with the keys {', '.join(fields)}")
-        for key in node.entries.keys() - fields.keys():
+        tag = {kind.tag_field: kind.tag} if kind.tag_field else {}
+        for key in node.entries.keys() - fields.keys() - tag.keys():
             self._wrong(node.key_places[key], (*path, key), "is an unknown key", _did_you_mean(key, fields))
         for name, field in fields.items():
             if field.required and name not in node.entries and node.complete:
                 self._wrong(node.place, (*path, name), "is missing", f"write {name}: with {expected(field.type)}")
         known = ((key, value) for key, value in node.entries.items() if key in fields)
-        return {key: self.walk(value, fields[key].type, (*path, key)) for key, value in known}
+        return {**tag, **{key: self.walk(value, fields[key].type, (*path, key)) for key, value in known}}
+
+    def _member(self, node: Node, kind: inspect.UnionType, path: FieldPath) -> inspect.Type:
+        """The member of a union that the value means: None for an empty value, of several mappings the named one."""
+        empty = isinstance(node, Scalar) and node.value is None
+        members = [member for member in kind.types if isinstance(member, inspect.NoneType) == empty]
+        tags = {str(member.tag): member for member in members if isinstance(member, inspect.StructType) and member.tag}
+        if len(tags) < 2 or not isinstance(node, Mapping):
+            return members[0]
+        field = next(iter(tags.values())).tag_field or ""
+        given = node.entries.get(field)
+        named = str(given.value) if isinstance(given, Scalar) else ""
+        if named in tags:
+            return tags[named]
+        what = f"is {shown(given)}" if given else "is missing"
+        remedy = f"write {field}: with one of {', '.join(tags)}"
+        self._wrong(given.place if given else node.place, (*path, field), what, remedy)
+        return members[0]
 
     def _dict(self, node: Node, kind: inspect.DictType, path: FieldPath) -> Any:
         if not isinstance(node, Mapping) or len(node.entries) < (kind.min_length or 0):
@@ -85,7 +103,7 @@ def shown(node: Node) -> str:
 def expected(kind: inspect.Type) -> str:
     """A type of the schema in words, with its limits."""
     if isinstance(kind, inspect.UnionType):
-        return " or ".join(expected(member) for member in kind.types)
+        return " or ".join(dict.fromkeys(expected(member) for member in kind.types))
     if isinstance(kind, inspect.LiteralType):
         return "one of " + ", ".join(str(value) for value in sorted(kind.values, key=_rank))
     if isinstance(kind, inspect.IntType | inspect.FloatType):
@@ -136,12 +154,6 @@ def _in_range(value: float, kind: inspect.IntType | inspect.FloatType) -> bool:
         and (kind.le is None or value <= kind.le)
         and (kind.lt is None or value < kind.lt)
     )
-
-
-def _member(node: Node, kind: inspect.UnionType) -> inspect.Type:
-    """The member of an optional type that the value means: None for an empty value, else the other one."""
-    empty = isinstance(node, Scalar) and node.value is None
-    return next(member for member in kind.types if isinstance(member, inspect.NoneType) == empty)
 
 
 def _did_you_mean(key: str, known: Iterable[str]) -> str:

@@ -10,7 +10,7 @@ from typing import Final
 
 from daemon.loops.geometry import WHEELS_OF_PAIR, clamp
 from daemon.loops.measurement import Command, Measurement
-from profiles.schema import Limits, PairedSteerGeometry
+from profiles.schema import Geometry, Limits, PairedSteerGeometry
 
 ROLLING_M_S: Final = 0.02
 """Measured rim speed above which an engaged steering brake is not released."""
@@ -28,14 +28,15 @@ class Gate:
 
     Args:
         limits: of the vehicle.
-        geometry: of a robot with steering brakes; None where wheels are free of interlocks.
+        geometry: of the vehicle; without steering brakes wheels are free of interlocks.
+        acceleration_m_s2: of the wheels; None: the vehicle's.
     """
 
-    def __init__(self, limits: Limits, geometry: PairedSteerGeometry | None) -> None:
+    def __init__(self, limits: Limits, geometry: Geometry | None, acceleration_m_s2: float | None = None) -> None:
         self._wheel_speed_m_s = limits.wheel_speed_m_s
         self._steering_speed_m_s = limits.steering_rim_speed_m_s
-        self._acceleration_m_s2 = limits.acceleration_m_s2
-        self._paired = geometry is not None
+        self._acceleration_m_s2 = limits.acceleration_m_s2 if acceleration_m_s2 is None else acceleration_m_s2
+        self._paired = isinstance(geometry, PairedSteerGeometry)
 
     def apply(
         self, command: Command, measurement: Measurement, previous: Command, dt: float

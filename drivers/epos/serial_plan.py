@@ -12,7 +12,7 @@ from typing import Any
 
 import msgspec
 
-from profiles.schema import Limits, Profile
+from profiles.schema import Limits, PairedSteerGeometry, Profile
 
 READ_BYTES = 24
 """ReadObject: 10 from the host, 14 from the drive, acknowledges included."""
@@ -121,13 +121,14 @@ def serial_profile(profile: Profile, baud: int) -> Profile:
     """The profile as it can be run over the serial line of one of its drives.
 
     Rate, guarding and time-outs are those of the line; the vehicle's limits shrink with the rate; the drive on the line
-    gets targets that expire by themselves.
+    gets targets that expire by themselves. There is no time for an accelerometer.
     """
     line, network, gateway = plan(profile, baud), profile.network, gateway_of(profile)
     replace = msgspec.structs.replace
     deceleration = min(drive.quick_stop_m_s2 for drive in profile.drives.values())
     return replace(
         profile,
+        accelerometer=None,
         network=replace(
             network,
             cycle_hz=round(line.cycle_hz, 3),
@@ -141,7 +142,7 @@ def serial_profile(profile: Profile, baud: int) -> Profile:
             gateway=gateway,
         ),
         drives={
-            name: replace(drive, mode="expiring_position") if name == gateway else drive
+            name: replace(drive, analog_inputs=False, mode="expiring_position" if name == gateway else drive.mode)
             for name, drive in profile.drives.items()
         },
         limits=serial_limits(profile.limits, deceleration, 1.0 / network.cycle_hz, line.cycle_s),
@@ -182,7 +183,7 @@ def stopping_way_m(profile: Profile, speed_m_s: float) -> float:
 
 def stopping_turn_rad(profile: Profile) -> float | None:
     """By how much a pair that is being turned turns on in that time [rad]; None for a robot without such pairs."""
-    if profile.vehicle is None:
+    if not isinstance(profile.vehicle, PairedSteerGeometry):
         return None
     way_m = stopping_way_m(profile, profile.limits.steering_rim_speed_m_s)
     return way_m / profile.vehicle.contact_offset_m if profile.vehicle.contact_offset_m else math.pi

@@ -248,7 +248,7 @@ class Max2dWorld:
 
 def _parts_of(profile: Profile) -> tuple[PairedSteerGeometry, SimulationConfig]:
     """The sections of the profile that the physics needs."""
-    if profile.vehicle is None or profile.simulation is None:
+    if not isinstance(profile.vehicle, PairedSteerGeometry) or profile.simulation is None:
         raise ConfigError(
             f"profile {profile.name} cannot be simulated as a vehicle: it needs the sections vehicle and simulation",
             object="simulation" if profile.simulation is None else "vehicle",

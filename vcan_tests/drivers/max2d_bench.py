@@ -16,7 +16,7 @@ START = (0.0, 0.0, 0.0)
 
 
 def vehicle() -> PairedSteerGeometry:
-    assert PROFILE.vehicle is not None
+    assert isinstance(PROFILE.vehicle, PairedSteerGeometry)
     return PROFILE.vehicle
 
 

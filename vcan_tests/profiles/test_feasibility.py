@@ -16,7 +16,7 @@ from profiles.loader import load
 from profiles.schema import DriveConfig
 from vcan_tests.profiles.conftest import Mistakes, Robot
 
-LOAD = Load(mass_kg=7.0, wheel_inertia_kg_m2=0.008, friction=0.8, rolling_resistance=0.015)
+LOAD = Load(mass_kg=7.0, weight_n=7.0 * 9.81, wheel_inertia_kg_m2=0.008, friction=0.8, rolling_resistance=0.015)
 
 
 @pytest.fixture(scope="module")
