@@ -18,8 +18,10 @@ from daemon.api.gateway309_lss import LssCommands
 from daemon.api.gateway309_text import Lss, Nmt, Read, Refusal, Request, Set, Tell, Write, parse_request
 from daemon.api.gateway309_types import print_value
 from daemon.runtime.interlocks import require_all_disabled, require_reach_allowed, require_write_allowed
+from daemon.runtime.network_commands import table_of
 from daemon.runtime.supervisor import Supervisor
 from drivers.canopen.sdo import ABORT_OUT_OF_MEMORY, ABORT_TIMEOUT
+from drivers.canopen.sdo_block import WRONG_LENGTH
 
 SDO_TIMEOUT_S = 0.5
 """How long a node may take to answer, until the client sets another time."""
@@ -106,9 +108,20 @@ class Session:
     async def _write(self, node: int, command: Write) -> str:
         self._require_write()
         require_write_allowed(self._supervisor, node, command.index)
+        self._require_length(node, command)
         client = self._supervisor.master.sdo(node)
         await client.write_raw((command.index, command.sub), command.data, self._timeout_s)
         return "OK"
+
+    def _require_length(self, node: int, command: Write) -> None:
+        """Refuse what does not fit the object, as its node would: over a serial line the node is not told the length.
+
+        The objects of a node that the profile does not name are unknown.
+        """
+        entry = table_of(self._supervisor, node).at(command.index, command.sub)
+        known = node in self._supervisor.devices.by_node and entry is not None and entry.type.bits
+        if known and len(command.data) * 8 != known:
+            raise Aborted("the value has another length than the object", value=WRONG_LENGTH)
 
     def _nmt(self, node: int, command: Nmt) -> str:
         self._require_write()

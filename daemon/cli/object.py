@@ -61,9 +61,9 @@ def object_show(name: str, /, *, node_type: OneType = None, eds: EdsFile = None,
     tables = _tables(node_type, eds)
     rows = [_record(entry, kind) for kind, table in tables.items() for entry in _entries(table, name)]
     if not rows:
-        raise UsageError(
-            f"no object {name!r}", object=name, remedy="canhelm object list PATTERN looks for names and meanings"
-        )
+        near = " or ".join(dict.fromkeys(filter(None, (table.name_like(name) for table in tables.values()))))
+        remedy = "`canhelm object list PATTERN` looks for names and meanings"
+        raise UsageError(f"no object {name!r}", object=name, remedy=f"did you mean {near}?" if near else remedy)
     show(rows, _records, json)
 
 

@@ -50,21 +50,18 @@ class NetworkCommands:
         return {"node": params["node"], "command": params["command"], **note}
 
     def _object(self, node: int, text: str) -> ObjectDef | tuple[int, int]:
-        found = self._table(node).find(text)
+        table = table_of(self._supervisor, node)
+        found = table.find(text)
         if found is not None:
             return found
         address = parse_address(text)
         if address is None:
+            near = table.name_like(text)
+            forms = "a name (`canhelm object list`), 0x6041, or 0x2078/1"
             raise UsageError(
-                f"no object {text!r}", object=text, remedy="a name (`canhelm object list`), 0x6041, or 0x2078/1"
+                f"no object {text!r}", object=text, remedy=f"did you mean {near}?" if near else f"give {forms}"
             )
         return address
-
-    def _table(self, node: int) -> ObjectTable:
-        device = self._supervisor.devices.by_node.get(node)
-        if device is not None and device.name in self._supervisor.devices.encoders:
-            return ENCODER_OBJECTS
-        return EPOS_OBJECTS
 
     async def _sdo_read(self, params: Params, lease: str | None) -> dict[str, Any]:
         node = node_number(self._supervisor, params["node"])
@@ -112,6 +109,14 @@ class NetworkCommands:
             value=error.value,
             remedy="`canhelm sdo read NODE 0x2003/1` tells its firmware; leave this object alone",
         )
+
+
+def table_of(supervisor: Supervisor, node: int) -> ObjectTable:
+    """The objects of a node: an encoder's where the profile says so, a drive's otherwise."""
+    device = supervisor.devices.by_node.get(node)
+    if device is not None and device.name in supervisor.devices.encoders:
+        return ENCODER_OBJECTS
+    return EPOS_OBJECTS
 
 
 def _readings(wanted: ObjectDef, value: int | str | bytes) -> dict[str, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
+from difflib import get_close_matches
 from enum import Enum
 
 
@@ -167,6 +168,10 @@ class ObjectTable:
             return self.by_name[text]
         address = parse_address(text)
         return self.by_address.get(address) if address else None
+
+    def name_like(self, text: str) -> str | None:
+        """The name that comes nearest to one that is misspelt; None where none is near."""
+        return next(iter(get_close_matches(text.lower(), self.by_name, 1)), None)
 
 
 def parse_address(text: str) -> tuple[int, int] | None:

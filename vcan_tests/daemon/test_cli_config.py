@@ -169,6 +169,11 @@ def test_an_index_shows_all_its_entries(capsys: pytest.CaptureFixture[str]) -> N
     assert shown == ["0x2078", "0x2078/1", "0x2078/2", "0x2078/3"]
 
 
+def test_a_misspelt_object_is_told_the_names_that_come_nearest(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("object", "show", "statusord") == 2
+    assert capsys.readouterr().err == "canhelm: no object 'statusord' - did you mean statusword?\n"
+
+
 def test_an_object_of_later_firmware_is_marked(capsys: pytest.CaptureFixture[str]) -> None:
     run("object", "show", "0x6067")
     assert "later firmware" in json.loads(capsys.readouterr().out)["firmware"]

@@ -127,6 +127,23 @@ async def test_an_interlock_cannot_be_got_round_by_objects(line: str) -> None:
         assert FORBIDDEN[line] in answer
 
 
+@pytest.mark.parametrize("bus", ["simulated", "rs232"])
+@pytest.mark.parametrize("value", ["u8 5", "u64 5", "hex 05 00 00"])
+async def test_a_value_of_another_length_than_its_object_is_refused_on_any_wire(bus: str, value: str) -> None:
+    async with running_robot(bus=bus) as robot:
+        session = Session(robot.app.supervisor)
+        before = await ask(session, "[1] 4 r 0x6083 0 u32")
+        assert (await ask(session, f"[2] 4 w 0x6083 0 {value}")).startswith("[2] ERROR:0x06070010 #")
+        assert await ask(session, "[1] 4 r 0x6083 0 u32") == before
+
+
+async def test_a_text_and_the_objects_of_strangers_have_any_length() -> None:
+    async with running_robot() as robot:
+        session = Session(robot.app.supervisor)
+        assert (await ask(session, '[1] 4 w 0x1008 0 vs "A"')).startswith("[1] ERROR:0x06010002")
+        assert (await ask(session, "[2] 99 w 0x6083 0 u8 5")).startswith("[2] ERROR:0x05040000")
+
+
 async def test_outputs_that_work_a_brake_are_not_switched_by_objects() -> None:
     async with running_robot(booted=False, powered=False) as robot:
         brake = next(iter(robot.app.devices.brakes.values()))

@@ -77,3 +77,18 @@ async def test_a_network_command_to_a_node_outside_the_profile_says_so() -> None
     async with running_robot() as robot:
         assert "55 is not in the profile" in (await robot.call("nmt", command="stop", node=55))["note"]
         assert "note" not in await robot.call("nmt", command="start", node=5)
+
+
+@pytest.mark.parametrize(
+    ("node", "name", "remedy"),
+    [
+        (1, "profile_accelaration", "did you mean profile_acceleration?"),
+        (5, "Position_valu", "did you mean position_value?"),
+        (1, "xyzzy", "give a name (`canhelm object list`), 0x6041, or 0x2078/1"),
+    ],
+)
+async def test_a_misspelt_object_is_told_the_name_that_comes_nearest(node: int, name: str, remedy: str) -> None:
+    async with running_robot() as robot:
+        with pytest.raises(UsageError, match=name) as refused:
+            await robot.call("sdo.read", node=node, object=name)
+        assert refused.value.remedy == remedy
