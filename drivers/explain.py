@@ -13,6 +13,8 @@ from drivers.explain_serial import serial_readings
 KINDS = ("statusword", "controlword", "emcy", "abort", "object", "frame", "nmt", "register", "serial")
 
 _NUMBER = re.compile(r"(?P<prefix>0x)?(?P<digits>[0-9a-f]{1,10}?)(?P<suffix>h)?", re.IGNORECASE | re.ASCII)
+_LONG = re.compile(r"([0-9a-f]{2}){5,}", re.IGNORECASE | re.ASCII)
+"""Too many digits for a number."""
 
 
 def explain(text: str, kind: str | None = None) -> list[Reading]:
@@ -32,11 +34,13 @@ def explain(text: str, kind: str | None = None) -> list[Reading]:
     readings = [reading for reading in _readings(text, kind) if kind in (None, reading.kind)]
     if not readings:
         what = f"cannot be read as {kind}" if kind else "is no code, object or frame"
-        raise UsageError(f"{text!r} {what}", value=text, remedy=_accepted(kind))
+        raise UsageError(f"{text!r} {what}", value=text, remedy=_accepted(kind, text))
     return sorted(readings, key=lambda reading: reading.rank)
 
 
-def _accepted(kind: str | None) -> str:
+def _accepted(kind: str | None, text: str) -> str:
+    if kind is None and _LONG.fullmatch(text):
+        return f"bytes of an RS-232 line are written as serial:{text}"
     if kind == "frame":
         return "give identifier#data as candump writes it, e.g. 181#3703000000000000 or 701#R"
     if kind == "serial":

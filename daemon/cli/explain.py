@@ -18,17 +18,17 @@ if TYPE_CHECKING:
 Kind = Annotated[str | None, Parameter(name="--as", help=f"Read it as this alone: {', '.join(KINDS)}.")]
 
 
-def explain(code: str, *, as_: Kind = None, json: Json = None) -> None:
+def explain(*code: str, as_: Kind = None, json: Json = None) -> None:
     """Say what a code means, with cause and cure: every reading of it, the most likely first.
 
     Example: `canhelm explain 0x0337`, `canhelm explain 6320h --as emcy`, `canhelm explain 181#3703000000000000`,
-    `canhelm explain '10 01 41 60 00 01 AB F0'`
+    `canhelm explain 10 01 41 60 00 01 AB F0`
 
     Args:
         code: A statusword, controlword, EMCY code, SDO abort code, NMT byte, error register, object (name or address),
-            a frame as candump writes it, or the bytes of a frame of an EPOS's RS-232 line.
+            a frame as candump writes it, or the bytes of a frame of an EPOS's RS-232 line. Several words are one code.
     """
-    readings = [asdict(reading) for reading in read_code(code, as_)]
+    readings = [asdict(reading) for reading in read_code(" ".join(code), as_)]
     for reading in readings:
         del reading["rank"]
     show(readings, _panels, json)

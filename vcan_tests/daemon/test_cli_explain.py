@@ -21,6 +21,21 @@ def test_explain_as_one_kind_prints_that_alone(capsys: pytest.CaptureFixture[str
     assert [reading["kind"] for reading in readings] == ["emcy"]
 
 
+def test_the_bytes_of_a_frame_need_no_quotes(capsys: pytest.CaptureFixture[str]) -> None:
+    frame = "10 01 41 60 00 01 AB F0"
+    assert objects(capsys, "explain", *frame.split()) == objects(capsys, "explain", frame)
+
+
+def test_many_digits_in_one_word_are_told_how_bytes_are_written(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["explain", "100141600001"]) == 2
+    assert "serial:100141600001" in capsys.readouterr().err
+
+
+def test_nothing_to_explain_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["explain"]) == 2
+    assert "0x0337" in capsys.readouterr().err
+
+
 def test_nonsense_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["explain", "zzz"]) == 2
     assert "0x0337" in capsys.readouterr().err
