@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from typing import Any
 
-from canhelm.errors import Aborted, NodeAbsent, Refused, Timeout
+from canhelm.errors import Aborted, NodeAbsent, Refused, Timeout, UsageError
 from daemon.runtime.handlers import Handler, Params, node_number
 from daemon.runtime.interlocks import require_all_disabled
 from daemon.runtime.node_report import FIRMWARE, bit_rate_remark, missing_entry, node_entry
@@ -54,13 +54,29 @@ class NodeCommands:
     async def _scan(self, params: Params, lease: str | None) -> dict[str, Any]:
         first, last = params["first"], params["last"]
         master = self._supervisor.master
+        remarks = self._require_some(range(first, last + 1))
         found = await self._ask(range(first, last + 1))
         entries = [node_entry(each, await self._firmware(each)) for each in found]
         silent = set(self._supervisor.devices.by_node) - {each.node for each in found}
         missing = sorted(node for node in silent if first <= node <= last)
         entries += [missing_entry(node, master.names[node]) for node in missing]
         remark = bit_rate_remark(master.bus, bool(found), [master.who(node) for node in missing])
-        return {"nodes": sorted(entries, key=lambda entry: int(entry["node"])), "remarks": [remark] if remark else []}
+        remarks += [remark] if remark else []
+        return {"nodes": sorted(entries, key=lambda entry: int(entry["node"])), "remarks": remarks}
+
+    def _require_some(self, wanted: range) -> list[str]:
+        """What is to be said before; raises UsageError where there is nobody to ask."""
+        if not wanted:
+            raise UsageError(
+                f"node {wanted.start} lies behind node {wanted.stop - 1}", remedy="--first is the lower one of the two"
+            )
+        if self._supervisor.master.network.synchronous:
+            return []
+        nodes = sorted(self._supervisor.devices.by_node)
+        told = f"over RS-232 only nodes of the profile are asked: {', '.join(map(str, nodes))}"
+        if not set(wanted) & set(nodes):
+            raise UsageError(told, remedy="choose from these, or connect a CAN adapter")
+        return [told]
 
     async def _ask(self, nodes: range) -> list[FoundNode]:
         """Over a gateway each silent node id blocks the line for its time-out: ask those that are there."""

@@ -124,6 +124,29 @@ async def test_over_rs232_a_scan_at_rest_lists_the_nodes_and_loses_none() -> Non
         assert robot.state == "idle"
 
 
+async def test_over_rs232_a_scan_says_whom_it_asks() -> None:
+    async with running_robot(bus="rs232") as robot:
+        found = await robot.call("nodes.scan", first=1, last=2)
+        assert found["remarks"] == ["over RS-232 only nodes of the profile are asked: 1, 2, 3, 4, 5, 6"]
+
+
+@pytest.mark.parametrize(
+    ("bus", "first", "last", "told"),
+    [("simulated", 3, 2, "behind"), ("rs232", 3, 2, "behind"), ("rs232", 7, 127, "only")],
+)
+async def test_a_scan_that_could_ask_nobody_is_wrong_usage(bus: str, first: int, last: int, told: str) -> None:
+    async with running_robot(bus=bus, booted=False) as robot:
+        with pytest.raises(UsageError, match=told):
+            await robot.call("nodes.scan", first=first, last=last)
+
+
+async def test_over_rs232_a_scan_of_six_nodes_takes_no_longer_than_documented() -> None:
+    async with running_robot(bus="rs232") as robot:
+        begin = asyncio.get_running_loop().time()
+        await scan(robot)
+        assert asyncio.get_running_loop().time() - begin < 20.0
+
+
 async def test_over_rs232_a_scan_is_refused_while_a_drive_is_enabled() -> None:
     async with running_robot(bus="rs232") as robot:
         await robot.call("motor.enable", node=1)
