@@ -21,6 +21,10 @@ LATEST_S: Final = 1e9
 """Latest time that is planned with."""
 LIMIT_RANGE: Final = (1e-3, 1e3)
 """Smallest and largest limit that is planned with [SI]."""
+NEAR_M: Final = 1e-3
+"""A straight change of velocity that ends as near to the goal as this is the way to it: no loop for the last hair."""
+NOTHING: Final = 1e-12
+"""Smaller numbers are none [SI]."""
 LONGEST_CYCLE_S: Final = 10.0
 ROUNDING: Final = 1e-9
 
@@ -221,11 +225,12 @@ def _together(start: PlanarState, goal: PlanarState, limits: PlanarLimits) -> tu
     Not every duration is possible for a turn that begins and ends moving; one with a rest in it can take any
     duration from its shortest on.
     """
-    travel, end = (goal.x - start.x, goal.y - start.y), (goal.vx, goal.vy)
-    begin = start.vx, start.vy
-    turn = math.remainder(goal.heading - start.heading, math.tau), start.rate, goal.rate
+    travel = _plain(goal.x - start.x), _plain(goal.y - start.y)
+    begin, end = (_plain(start.vx), _plain(start.vy)), (_plain(goal.vx), _plain(goal.vy))
+    angle = math.remainder(goal.heading - start.heading, math.tau)
+    turn = _plain(angle), _plain(start.rate), _plain(goal.rate)
     turn_limits = limits.rate, limits.angular_acceleration
-    fastest = planner_way.fastest(travel, begin, end, limits.speed, limits.acceleration)
+    fastest = planner_way.fastest(travel, begin, end, limits.speed, limits.acceleration, NEAR_M)
     shortest = planner_axis.fastest(*turn, *turn_limits).duration
     way = planner_way.lasting(fastest, travel, begin, end, shortest)
     matched = planner_axis.in_time(*turn, *turn_limits, way.duration)
@@ -234,6 +239,10 @@ def _together(start: PlanarState, goal: PlanarState, limits: PlanarLimits) -> tu
         way = planner_way.lasting(fastest, travel, begin, end, rested.duration)
         matched = planner_axis.with_a_rest(*turn, *turn_limits, way.duration)
     return way, matched
+
+
+def _plain(number: float) -> float:
+    return 0.0 if abs(number) < NOTHING else number
 
 
 def _near(planned: PlanarState, state: PlanarState, tolerance: Tolerance) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 ROUNDING: Final = 1e-14
+AT_ONCE_S: Final = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +72,10 @@ def in_time(
     Two halves of opposite acceleration A: A^2 T^2 / 4 - A q - (end - start)^2 / 4 = 0 with
     q = travel - (start + end) T / 2. Where their peak is above the limit, the limit is held between them.
     """
-    if duration <= 0.0 or abs(start) > limit:
-        return AxisPlan(start, ()) if travel == 0.0 and start == end and duration == 0.0 else None
+    if travel == 0.0 and start == end and duration <= AT_ONCE_S:
+        return AxisPlan(start, ())
+    if duration <= AT_ONCE_S or abs(start) > limit:
+        return None
     q = travel - (start + end) * duration / 2
     least = 2 * (q + math.copysign(math.hypot(q, (end - start) * duration / 2), q)) / duration**2
     peak = (start + end + least * duration) / 2

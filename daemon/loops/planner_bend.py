@@ -6,7 +6,7 @@ Units as in planner_arcs.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Final
 
 from daemon.loops.planner_arcs import Bend, Ramp, Vector, ramp_between
@@ -14,11 +14,16 @@ from daemon.loops.planner_arcs import Bend, Ramp, Vector, ramp_between
 ROUNDING: Final = 1e-12
 STRAIGHT: Final = 1e-9
 """Below this length of the shortest costate, relative to the duration, a bend is two straight changes of velocity."""
-TRIALS: Final = 40
+TRIALS: Final = 20
+RATIOS: Final = 1.2, 3.0, 10.0
+"""Lengths of the costate at the end of a bend over that at its start, tried as guesses."""
 
 
-def corner(travel: Vector, start: Vector, end: Vector) -> Vector | None:
-    """The velocity between two straight changes of velocity that cover the travel, however high it is."""
+def corner(travel: Vector, start: Vector, end: Vector, guess: Vector) -> Vector | None:
+    """The velocity between two straight changes of velocity that cover the travel, however high it is.
+
+    There is more than one where a fast goal is so near that it is passed and met again.
+    """
     (px, py), (ax, ay), (bx, by) = travel, start, end
 
     def missing(x: float, y: float) -> Vector:
@@ -26,10 +31,7 @@ def corner(travel: Vector, start: Vector, end: Vector) -> Vector | None:
         return px - ((ax + x) * first + (bx + x) * last) / 2, py - ((ay + y) * first + (by + y) * last) / 2
 
     way = math.hypot(px, py)
-    root = math.sqrt(way) or 1.0
-    tolerance = ROUNDING * (way + math.hypot(ax, ay, bx, by) ** 2)
-    guesses = (px / root, py / root), (-(ax + bx) / 2, -(ay + by) / 2)
-    return next(filter(None, (solve_pair(missing, guess, tolerance, root + 1.0) for guess in guesses)), None)
+    return solve_pair(missing, guess, ROUNDING * (way + math.hypot(ax, ay, bx, by) ** 2), math.sqrt(way) + 1.0)
 
 
 def ramps(start: Vector, end: Vector, via: Vector) -> list[Ramp]:
@@ -56,7 +58,31 @@ def bend(travel: Vector, start: Vector, end: Vector, via: Vector) -> Bend | None
     scale = duration / 2 / (change * change)
     shortest, begin = abs(turn) * scale, (fx * (lx - fx) + fy * (ly - fy)) * scale - first / 2
     side = math.copysign(1.0, turn)
+    guess = math.asinh(begin / shortest), math.asinh((begin + duration) / shortest)
+    return _bend_near(travel, start, end, side, guess)
 
+
+def bends(travel: Vector, start: Vector, end: Vector) -> Iterator[Bend]:
+    """Bends without a corner to begin from, as where little more than a straight change of velocity is left to do.
+
+    What that change misses tells the side; the turn that makes up for it, 12 / length^2 of the miss, is tried as the
+    first, the middle and the last part of a bend.
+    """
+    x, y = end[0] - start[0], end[1] - start[1]
+    length = math.hypot(x, y)
+    if not length:
+        return
+    missed = travel[0] - (start[0] + end[0]) / 2 * length, travel[1] - (start[1] + end[1]) / 2 * length
+    across = (x * missed[1] - y * missed[0]) / length
+    turn = min(1.0, 12 * abs(across) / (length * length)) or 1.0
+    for ratio in RATIOS:
+        near, far = math.asinh(2 * (1 - 1 / ratio) / turn), math.log(ratio)
+        for guess in (near, near + far), (-near - far, -near), (-far, far):
+            if arc := _bend_near(travel, start, end, -math.copysign(1.0, across), guess):
+                yield arc
+
+
+def _bend_near(travel: Vector, start: Vector, end: Vector, side: float, guess: Vector) -> Bend | None:
     def missing(u0: float, u1: float) -> Vector:
         if not -MOST < u0 < u1 < MOST:
             return math.inf, math.inf
@@ -64,8 +90,8 @@ def bend(travel: Vector, start: Vector, end: Vector, via: Vector) -> Bend | None
         x, y, _, _ = arc.at(arc.duration)
         return travel[0] - x, travel[1] - y
 
-    guess = math.asinh(begin / shortest), math.asinh((begin + duration) / shortest)
-    ends = solve_pair(missing, guess, ROUNDING * (math.hypot(*travel) + duration * duration), 1.5)
+    change = math.hypot(end[0] - start[0], end[1] - start[1])
+    ends = solve_pair(missing, guess, ROUNDING * (math.hypot(*travel) + change * change), 1.5)
     return bend_between(start, end, side, *ends) if ends else None
 
 

@@ -12,45 +12,89 @@ from typing import Final
 
 from daemon.loops.planner_arcs import Arc, Ramp, Vector, ramp_between
 from daemon.loops.planner_axis import fastest
-from daemon.loops.planner_bend import bend, corner, ramps, top_speed
+from daemon.loops.planner_bend import bend, bends, corner, ramps, top_speed
 from daemon.loops.planner_cruise import cruise, half_ramp, half_turn, ramp_arcs, turn_arcs
 
 PRECISE: Final = 1e-11
 """Largest miss of an accepted way, relative to 1 + its length."""
+LIKELY: Final = 1.1
+"""A way that takes no more than this longer than a lower bound is taken for the fastest without a wider search."""
+MAY_CRUISE: Final = 0.7
+"""Speed of the corner above which a cruise at the speed limit is sought."""
+SAME: Final = 1e-6
+"""Distance of two corners that are one."""
 IN_LINE: Final = 1e-13
 """Sine of the angle below which two vectors lie on one line."""
 
 
-def fastest_way(travel: Vector, start: Vector, end: Vector) -> tuple[str, Sequence[Arc]]:
+def fastest_way(travel: Vector, start: Vector, end: Vector, near: float = 0.0) -> tuple[str, Sequence[Arc]]:
     """The shape and the arcs of the fastest way.
 
     Args:
         travel: displacement to the goal.
         start: velocity now, |start| <= 1.
         end: velocity at the goal, |end| <= 1.
+        near: a straight change of velocity that ends as near to the goal as this is taken as the way.
     """
+    if straight := in_line(travel, start, end):
+        return "line", straight
+    direct = [ramp_between(start, end)]
+    if misses(direct, travel, end) <= near:
+        return "ramp", direct
     precise = PRECISE * (1 + math.hypot(*travel))
+    best: tuple[str, Sequence[Arc]] = "stop and go", stop_and_go(travel, start, end)
+    least, enough = duration(best[1]), LIKELY * least_time(travel, start, end)
     for shape, arcs in _ways(travel, start, end):
-        if arcs and misses(arcs, travel, end) <= precise:
-            return shape, arcs
-    return "stop and go", stop_and_go(travel, start, end)
+        if (time := duration(arcs)) < least and misses(arcs, travel, end) <= precise:
+            least, best = time, (shape, arcs)
+        if least <= enough:
+            break
+    return best
 
 
-def _ways(travel: Vector, start: Vector, end: Vector) -> Iterator[tuple[str, Sequence[Arc] | None]]:
-    """The fastest first; not every one exists."""
-    yield "line", in_line(travel, start, end)
-    via = corner(travel, start, end)
-    if via is None:
-        return
-    heading, too_fast = math.atan2(via[1], via[0]), math.hypot(*via) > 1
-    if too_fast and (found := cruise(half_turn, travel, start, end, heading)):
+def _ways(travel: Vector, start: Vector, end: Vector) -> Iterator[tuple[str, Sequence[Arc]]]:
+    """Ways that exist, the likely ones first."""
+    middle = (start[0] + end[0]) / 2, (start[1] + end[1]) / 2
+    root = math.sqrt(math.hypot(*travel)) or 1.0
+    known: list[Vector] = []
+    for guess in (travel[0] / root, travel[1] / root), middle, (-middle[0], -middle[1]):
+        via = corner(travel, start, end, guess)
+        if via and all(math.dist(via, other) > SAME for other in known):
+            known.append(via)
+            yield from _ways_near(travel, start, end, via)
+    for arc in bends(travel, start, end):
+        if top_speed(arc) <= 1 + PRECISE:
+            yield "bend", [arc]
+
+
+def _ways_near(travel: Vector, start: Vector, end: Vector, via: Vector) -> Iterator[tuple[str, Sequence[Arc]]]:
+    """Ways like two straight changes of velocity by a corner."""
+    heading, speed = math.atan2(via[1], via[0]), math.hypot(*via)
+    if speed > MAY_CRUISE and (found := cruise(half_turn, travel, start, end, heading)):
         yield "turns", turn_arcs(start, end, *found)
     if (arc := bend(travel, start, end, via)) and top_speed(arc) <= 1 + PRECISE:
         yield "bend", [arc]
-    if not too_fast:
+    if speed <= 1:
         yield "ramps", ramps(start, end, via)
     elif found := cruise(half_ramp, travel, start, end, heading):
         yield "ramps", ramp_arcs(start, end, *found)
+
+
+def least_time(travel: Vector, start: Vector, end: Vector) -> float:
+    """A time that no way can be faster than: that of one axis alone, the longest of three directions."""
+    change = end[0] - start[0], end[1] - start[1]
+    length = math.hypot(*change)
+    x, y = travel[0] - (start[0] + end[0]) / 2 * length, travel[1] - (start[1] + end[1]) / 2 * length
+    least = length
+    for vx, vy in travel, (x, y):
+        size = math.hypot(vx, vy) or 1.0
+        way, first, last = ((vx * ax + vy * ay) / size for ax, ay in (travel, start, end))
+        least = max(least, fastest(way, first, last, 1.0, 1.0).duration)
+    return least
+
+
+def duration(arcs: Iterable[Arc]) -> float:
+    return math.fsum(arc.duration for arc in arcs)
 
 
 def misses(arcs: Iterable[Arc], travel: Vector, end: Vector) -> float:

@@ -67,7 +67,7 @@ class Way:
         return last
 
 
-def fastest(travel: Vector, start: Vector, end: Vector, speed: float, acceleration: float) -> Way:
+def fastest(travel: Vector, start: Vector, end: Vector, speed: float, acceleration: float, near: float = 0.0) -> Way:
     """The fastest way; a start above the speed limit is braked to it first, straight.
 
     Args:
@@ -76,17 +76,18 @@ def fastest(travel: Vector, start: Vector, end: Vector, speed: float, accelerati
         end: velocity at the goal [m/s], within the limit.
         speed: limit [m/s].
         acceleration: limit [m/s2].
+        near: a straight change of velocity that ends as near to the goal as this [m] is taken as the way.
     """
     length = speed * speed / acceleration
     x, y = travel[0] / length, travel[1] / length
     begin, final = _within(start, speed), _within(end, speed)
     raw = start[0] / speed, start[1] / speed
     if begin == raw:
-        shape, arcs = fastest_way((x, y), begin, final)
+        shape, arcs = fastest_way((x, y), begin, final, near / length)
         return _way(shape, speed, acceleration, raw, arcs)
     slowing = ramp_between(raw, begin)
     dx, dy, _, _ = slowing.at(slowing.duration)
-    shape, arcs = fastest_way((x - dx, y - dy), begin, final)
+    shape, arcs = fastest_way((x - dx, y - dy), begin, final, near / length)
     return _way(shape, speed, acceleration, raw, [slowing, *arcs])
 
 
