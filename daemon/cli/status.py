@@ -30,6 +30,15 @@ NARROW = 80
 """A terminal with fewer columns than this does without the devices' types."""
 HIDDEN = ("type", "methods", "name", "bit_rate")
 """Fields of a section that do not change and are left to JSON."""
+BUS_GROUPS = {
+    "line": ("baud", "line_utilisation", "own_idle_share", "exchanges"),
+    "line plan": ("planned_", "speed_limit_", "silent_line_"),
+    "bus trouble": (
+        "dropped_", "error_frames", "down", "remedy", "line_down", "silent_nodes", "resyncs", "line_retries",
+        "unknown", "malformed", "foreign", "late_answers", "toggle_errors", "nodes_lost", "internal_errors",
+    ),
+}  # fmt: skip
+"""Fields of the bus that have a line of their own, by how they begin."""
 SEVERE = ("fault", "estop", "refused", "absent", "error")
 BUSY = ("active", "stopping", "waiting", "booting", "configuring", "warning")
 SHOWN_EVENTS = 5
@@ -68,9 +77,9 @@ def table(data: Mapping[str, Any]) -> RenderableType:
     nodes = data.get("nodes") or ()
     parts: list[RenderableType] = [_headline(data), _NodeTable(nodes), *_troubles(nodes)]
     parts.append(_brakes(data.get("brakes") or ()))
-    parts += [
-        _section(title, data[title]) for title in ("vehicle", "motions", "cycle", "bus", "recording") if data.get(title)
-    ]
+    sections = {title: data.get(title) for title in ("vehicle", "motions", "cycle")}
+    sections |= {**_bus_groups(data.get("bus") or {}), "recording": data.get("recording")}
+    parts += [_section(title, value) for title, value in sections.items() if value]
     parts += [_event(event) for event in list(data.get("events") or ())[-SHOWN_EVENTS:]]
     return Group(*parts)
 
@@ -154,10 +163,19 @@ def _section(title: str, value: Any) -> RenderableType:
     return Text.assemble((f"{title}: ", "bold"), "; ".join(words(_telling(item)) for item in items))
 
 
+def _bus_groups(bus: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """What is told of the bus, by the head of its line."""
+    rest = _telling(bus)
+    groups = {
+        title: {key: rest.pop(key) for key in list(rest) if key.startswith(beginnings)}
+        for title, beginnings in BUS_GROUPS.items()
+    }
+    return {"bus": rest, **groups}
+
+
 def _telling(item: Mapping[str, Any]) -> dict[str, Any]:
-    """A section without what never changes and without counters that stand at zero."""
-    zero = [key for key, value in item.items() if isinstance(value, int) and not value]
-    return {key: value for key, value in item.items() if key not in HIDDEN and key not in zero}
+    """A section without what never changes, what is empty, and counters that stand at zero."""
+    return {key: value for key, value in item.items() if key not in HIDDEN and (value or isinstance(value, float))}
 
 
 def _event(event: Mapping[str, Any]) -> RenderableType:

@@ -42,10 +42,23 @@ def drawn(status: dict[str, Any], width: int = 120) -> str:
 @pytest.mark.parametrize(
     "told",
     ["max2d  fault  node 3 (front_left) was lost", "-250", "no boot-up; is motor power on?",
-     "position error - check the encoder", "rear engaged", "load 0.12, unknown 4", "front_left: lost - power?"],
+     "position error - check the encoder", "rear engaged", "bus: load 0.12\n", "bus trouble: unknown 4\n",
+     "front_left: lost - power?"],
 )  # fmt: skip
 def test_the_status_table_tells(told: str) -> None:
     assert told in drawn(STATUS)
+
+
+def test_what_is_empty_or_zero_is_left_out_of_the_status_for_people() -> None:
+    bus = {"load": 0.0, "silent_nodes": [], "line_down": None, "resyncs": 0}
+    assert drawn({"robot": "r", "state": "idle", "bus": bus}).splitlines()[-1] == "bus: load 0"
+
+
+def test_a_serial_line_is_told_in_groups_with_a_line_each() -> None:
+    bus = {"load": 0.3, "baud": 115200, "planned_hz": 16.1, "silent_line_stop_s": 1.87, "silent_nodes": [3]}
+    told = drawn({"robot": "r", "state": "idle", "bus": bus}).splitlines()[-4:]
+    plan = "line plan: planned_hz 16.1, silent_line_stop_s 1.87"
+    assert told == ["bus: load 0.3", "line: baud 115200", plan, "bus trouble: silent_nodes 3"]
 
 
 def test_the_status_of_a_robot_without_nodes_is_drawn() -> None:
