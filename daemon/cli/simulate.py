@@ -106,13 +106,13 @@ async def _on_terminal(
 
 
 async def _on_interface(profile: Profile, nodes: str | None, spec: str, seed: int) -> None:
-    """Put the nodes onto a CAN interface; each frame has the time of the simulated wire before that of the real one."""
+    """Put the nodes onto a CAN interface; the time on the wire is the interface's."""
     from drivers.bus.interfaces import open_bus
     from drivers.simulated.bus import SimulatedBus
     from drivers.simulated.network import SimulatedNetwork
 
     ended = _ending()
-    medium = SimulatedBus(profile.network.bit_rate)
+    medium = SimulatedBus(profile.network.bit_rate, instant=True)
     network = SimulatedNetwork(profile, medium, seed)
     near, far = medium.port("interface"), open_bus(spec, profile.network.bit_rate)
     near.receiver = lambda can_id, data, _: far.send(can_id, data)

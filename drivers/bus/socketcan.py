@@ -238,8 +238,13 @@ class SocketCanBus(Bus):
         if self._link is not None:
             try:
                 self._link.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, self._filters())
+                self._link.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_RECV_OWN_MSGS, self._wants_own())
             except OSError as error:
                 self._lose(error)
+
+    def _wants_own(self) -> bool:
+        """Whether anybody here wants to see this socket's own frames."""
+        return bool(self.taps or self._heard)
 
     def _filters(self) -> bytes:
         if self.taps or self._wanted is None:
@@ -273,7 +278,7 @@ class SocketCanBus(Bus):
         link.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
         link.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
         link.setsockopt(socket.SOL_SOCKET, SO_RXQ_OVFL, 1)
-        link.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_RECV_OWN_MSGS, 1)
+        link.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_RECV_OWN_MSGS, self._wants_own())
         link.setsockopt(socket.SOL_CAN_RAW, _CAN_RAW_ERR_FILTER, can_errors.ALL_CLASSES)
         link.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, self._filters())
         return link

@@ -101,6 +101,7 @@ class SimulatedBus:
         bit_rate: bit/s.
         name: the interface's name as it stands in logs.
         seed: of the disturbances.
+        instant: frames take no time, for nodes on an interface whose wire takes it.
         disturbed: share of the frames, 0 to 1, whose last bit a disturbance destroys. Nobody gets such a frame; its
             sender repeats it after the error frame.
 
@@ -109,14 +110,22 @@ class SimulatedBus:
         error_frames: frames destroyed.
     """
 
-    def __init__(self, bit_rate: int = 1_000_000, name: str = "vcan0", seed: int = 0, disturbed: float = 0.0) -> None:
+    def __init__(
+        self,
+        bit_rate: int = 1_000_000,
+        name: str = "vcan0",
+        seed: int = 0,
+        disturbed: float = 0.0,
+        *,
+        instant: bool = False,
+    ) -> None:
         self.bit_rate = bit_rate
         self.name = name
         self.frames: defaultdict[int, int] = defaultdict(int)
         self.error_frames = 0
         self._disturbed = disturbed
         self._random = random.Random(seed)
-        self._bit_s = 1.0 / bit_rate
+        self._bit_s = 0.0 if instant else 1.0 / bit_rate
         self._meter = LoadMeter(bit_rate)
         self._ports: list[SimulatedPort] = []
         self._routes: dict[int, tuple[SimulatedPort, ...]] = {}
@@ -192,7 +201,7 @@ class SimulatedBus:
         heappush(self._queue, queued)
         if current is None:
             self._begin_next(max(now, self._free_s))
-        elif queued < current and now <= self._start_s:
+        elif not self._delivering and queued < current and now <= self._start_s:
             heappush(self._queue, current)
             self._begin_next(self._start_s)
 

@@ -294,6 +294,23 @@ async def test_what_no_frame_can_be_is_refused_at_once() -> None:
         port.send(0x181, bytes(9))
 
 
+async def test_an_instant_bus_takes_no_time_and_lets_no_answer_overtake_what_it_answers() -> None:
+    bus = SimulatedBus(instant=True)
+    master, node = bus.port("master"), bus.port("node")
+    requests: list[Frame] = []
+
+    def answer(can_id: int, data: bytes, stamp: float) -> None:
+        requests.append((can_id, data, stamp))
+        node.send(0x581, data)
+
+    node.receiver = answer
+    answers = listen(master)
+    await asyncio.sleep(1.0)
+    master.send(0x601, b"\x40")
+    await asyncio.sleep(1e-9)
+    assert (requests, answers) == ([(0x601, b"\x40", 1.0)], [(0x581, b"\x40", 1.0)])
+
+
 async def test_statistics_tell_load_and_frames_by_identifier() -> None:
     bus = SimulatedBus(bit_rate=1000)
     sender = bus.port("master")

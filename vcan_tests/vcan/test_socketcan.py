@@ -270,6 +270,18 @@ async def fill(bus: SocketCanBus) -> None:
         await asyncio.sleep(0.001)
 
 
+async def test_own_frames_stay_in_the_kernel_while_nobody_looks(one: SocketCanBus) -> None:
+    def comes_back() -> int:
+        assert one._link is not None
+        return one._link.getsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_RECV_OWN_MSGS)
+
+    before = comes_back()
+    witness = Witness(one)
+    during = comes_back()
+    one.taps.remove(witness._see)
+    assert (before, during, comes_back()) == (0, 1, 0)
+
+
 # -- interfaces that fail ---------------------------------------------------------------------------------------------
 
 
