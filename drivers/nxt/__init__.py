@@ -1,0 +1,1 @@
+"""The LEGO MINDSTORMS NXT brick: telegrams, the line to it, the driver."""
