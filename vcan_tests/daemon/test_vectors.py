@@ -12,24 +12,13 @@ import pytest
 
 from daemon.loops.geometry import TurningSolution, clamp, contact_points, solve_turning
 from profiles.schema import PairedSteerGeometry
-from vcan_tests.daemon import vectors_turtle
+from vcan_tests.daemon import vectors_ackermann, vectors_nxt, vectors_semitrailer, vectors_turtle
 from vcan_tests.vectors_loader import read_vectors, vector_paths
 
 Case = dict[str, Any]
 
 LEFT_OUT: Final = frozenset(
     {
-        "seed002_closed_loop",
-        "seed002_kinematics",
-        "seed002_open_loop",
-        "seed002_path_law",
-        "seed002_stable_motion",
-        "seed003_ackermann",
-        "seed003_pid",
-        "seed004_kinematics",
-        "seed004_line_bend",
-        "seed004_modangle",
-        "seed004_rho_alpha_beta",
     }
 )
 """Kinds whose loops do not exist."""
@@ -108,6 +97,9 @@ def check_published_program(motion: TurningSolution, speed: float, printed: Case
 
 
 CHECKS: Final[dict[str, Callable[[Case], None]]] = {
+    **vectors_nxt.CHECKS,
+    **vectors_ackermann.CHECKS,
+    **vectors_semitrailer.CHECKS,
     **vectors_turtle.CHECKS,
     "seed001_parallel": check_parallel,
     "seed001_turning": check_turning,
