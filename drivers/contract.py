@@ -162,6 +162,19 @@ class SteeringEncoder(Device, Protocol):
         ...
 
 
+class Accelerometer(Protocol):
+    """Acceleration of the place where it sits, along its own two axes in the robot's plane."""
+
+    @property
+    def acceleration_m_s2(self) -> tuple[float, float] | None:
+        """Newest reading; None where there is none, or it is too old."""
+        ...
+
+    def status(self) -> dict[str, Any]:
+        """Reading for ``canhelm status``."""
+        ...
+
+
 class Brake(Protocol):
     """One brake on a digital output."""
 

@@ -9,8 +9,9 @@ from canhelm.errors import CanhelmError
 from drivers.canopen.boot import NodeBoot
 from drivers.canopen.device import CanopenDevice
 from drivers.canopen.master import Master
-from drivers.contract import Brake, Drive, NodeState, SteeringEncoder
+from drivers.contract import Accelerometer, Brake, Drive, NodeState, SteeringEncoder
 from drivers.encoder.encoder import Cia406Encoder
+from drivers.epos.accelerometer import AnalogAccelerometer
 from drivers.epos.brake import EposBrake
 from drivers.epos.drive import EposDrive
 from drivers.epos.gateway_drive import GatewayDrive
@@ -28,6 +29,7 @@ class Devices:
 
     Attributes:
         drives, encoders, brakes: by their names in the profile.
+        accelerometer: None where the profile has none.
         by_node: drives and encoders by node id.
     """
 
@@ -39,6 +41,10 @@ class Devices:
         self.brakes: dict[str, Brake] = {
             name: EposBrake(name, config, drives[config.drive]) for name, config in profile.brakes.items()
         }
+        sensor = profile.accelerometer
+        self.accelerometer: Accelerometer | None = (
+            None if sensor is None else AnalogAccelerometer(sensor, drives[sensor.drive])
+        )
         self.by_node: dict[int, CanopenDevice] = {
             device.node: device for device in (*drives.values(), *encoders.values())
         }

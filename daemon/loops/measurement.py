@@ -21,6 +21,7 @@ class Measurement:
         heading_rad: heading of each wheel pair.
         brake_engaged: True for each steering brake that is certainly engaged.
         brake_released: True for each steering brake that is certainly released (both False while it moves).
+        acceleration_m_s2: of the accelerometer's place along its axes; None without a reading.
     """
 
     time_s: float
@@ -29,6 +30,7 @@ class Measurement:
     heading_rad: tuple[float, ...] = ()
     brake_engaged: tuple[bool, ...] = ()
     brake_released: tuple[bool, ...] = ()
+    acceleration_m_s2: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)

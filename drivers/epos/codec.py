@@ -13,6 +13,10 @@ TPDO1_MAP = (OBJECTS["statusword"], OBJECTS["position_actual_value"], OBJECTS["c
 TPDO1 = pdo_struct(TPDO1_MAP)
 TPDO1_BYTES = TPDO1.size
 
+TPDO2_MAP = (OBJECTS["analog_input_1"], OBJECTS["analog_input_2"])
+"""Where a profile asks for the analog inputs."""
+TPDO2 = pdo_struct(TPDO2_MAP)
+
 TARGET_OBJECT = {
     Mode.PROFILE_VELOCITY: OBJECTS["target_velocity"],
     Mode.VELOCITY: OBJECTS["velocity_mode_setting_value"],

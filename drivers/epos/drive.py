@@ -13,7 +13,7 @@ from drivers.canopen.master import Master
 from drivers.canopen.pdo import rpdo_cob_id, tpdo_cob_id
 from drivers.contract import DriveState, Fault, NodeState
 from drivers.epos import device_control, moves
-from drivers.epos.codec import DRIVING_MODES, RPDO1, TPDO1, TPDO1_BYTES, make_rpdo3
+from drivers.epos.codec import DRIVING_MODES, RPDO1, TPDO1, TPDO1_BYTES, TPDO2, make_rpdo3
 from drivers.epos.configure import EposSetup, emergency_words
 from drivers.epos.device_control import drive_state
 from drivers.epos.objects import OBJECTS
@@ -44,6 +44,8 @@ class EposDrive(CanopenDevice):
         speed_m_s: rim speed over the last two intervals between readings: position difference by time difference.
         current_a: motor current, with the sign it has at the motor; :meth:`set_current` likewise.
         statusword: last one received.
+        analog_mv: voltages at its analog inputs, where its profile asks for them.
+        analog_time_s: loop time of their last reading.
         outputs: its digital outputs.
         waiters: everybody who waits for a statusword of it.
         turns: its transitions; a stop ends the one under way.
@@ -58,6 +60,8 @@ class EposDrive(CanopenDevice):
         self.state = DriveState.UNKNOWN
         self.position_m = self.speed_m_s = self.current_a = self.target_speed_m_s = 0.0
         self.statusword = 0
+        self.analog_mv = (0.0, 0.0)
+        self.analog_time_s = -math.inf
         self.mode = self.driving_mode = DRIVING_MODES[config.mode]
         self.outputs = OutputBits(self.sdo)
         self.on_ready_change: list[Callable[[bool], None]] = []
@@ -72,6 +76,9 @@ class EposDrive(CanopenDevice):
         self.turns = Turns(self.who, config.node)
         self.waiters = StatuswordWaiters(self.who, config.node)
         master.subscribe(tpdo_cob_id(1, config.node), self._on_tpdo1)
+        self._reads_analog = config.analog_inputs
+        if config.analog_inputs:
+            master.subscribe(tpdo_cob_id(2, config.node), self._on_tpdo2)
 
     # --- cyclic --------------------------------------------------------------------------------------------------
 
@@ -89,6 +96,16 @@ class EposDrive(CanopenDevice):
             self._on_statusword(statusword)
         if self.waiters:
             self.waiters.take(statusword)
+        if self.on_reading is not None and not self._reads_analog:
+            self.on_reading(self.node)
+
+    def _on_tpdo2(self, can_id: int, data: bytes, timestamp: float) -> None:
+        """Comes after TPDO1 of the same SYNC, because its identifier is larger, and completes the reading."""
+        if len(data) != TPDO2.size:
+            self.master.counters.malformed += 1
+            return
+        self.analog_mv = TPDO2.unpack(data)
+        self.analog_time_s = timestamp
         if self.on_reading is not None:
             self.on_reading(self.node)
 

@@ -10,7 +10,7 @@ import msgspec
 from drivers.canopen.dcf import DeviceKind
 from drivers.canopen.objects import Access, ObjectDef
 from drivers.canopen.pdo import AT_ONCE, ON_SYNC, Settings, rpdo_settings, tpdo_settings
-from drivers.epos.codec import DRIVING_MODES, RPDO1_MAPS, TPDO1_MAP
+from drivers.epos.codec import DRIVING_MODES, RPDO1_MAPS, TPDO1_MAP, TPDO2_MAP
 from drivers.epos.codes import CAN_BIT_RATES
 from drivers.epos.objects import OBJECTS
 from drivers.epos.units import WheelUnits
@@ -67,12 +67,13 @@ def pdo_plan(config: DriveConfig, *, synchronous: bool = True) -> Settings:
     """COB-IDs, transmission types and mappings; unused PDOs too, because at factory settings all belong to node 1."""
     node, rpdo1_map = config.node, RPDO1_MAPS[DRIVING_MODES[config.mode]]
     cyclic = ON_SYNC if synchronous else AT_ONCE
+    tpdo2 = (cyclic, TPDO2_MAP) if config.analog_inputs else (AT_ONCE, None)
     return [
         *rpdo_settings(OBJECTS, 1, node, cyclic, rpdo1_map),
         *rpdo_settings(OBJECTS, 2, node, AT_ONCE),
         *rpdo_settings(OBJECTS, 3, node, AT_ONCE),
         *tpdo_settings(OBJECTS, 1, node, cyclic, TPDO1_MAP),
-        *tpdo_settings(OBJECTS, 2, node, AT_ONCE),
+        *tpdo_settings(OBJECTS, 2, node, *tpdo2),
         *tpdo_settings(OBJECTS, 3, node, AT_ONCE),
     ]
 

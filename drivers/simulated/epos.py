@@ -99,7 +99,11 @@ class SimulatedEpos(SimulatedNode):
 
     def set_analog_input(self, number: int, value_mv: int) -> None:
         """Apply a voltage [mV] to analog input 1 or 2."""
-        self._measurements.analog_mv[number - 1] = value_mv
+        self.connect_analog_input(number, lambda: value_mv)
+
+    def connect_analog_input(self, number: int, read: Callable[[], float]) -> None:
+        """Measure a voltage [mV] at analog input 1 or 2 by ``read``, each time it is asked for."""
+        self._measurements.analog_mv[number - 1] = read
 
     def set_supply_voltage(self, voltage_v: float) -> None:
         """Change the supply voltage as the drive measures it; outside its range the drive faults until it is back."""

@@ -26,12 +26,12 @@ class Measurements:
 
     Attributes:
         captured_qc: position at the last edge of the position marker.
-        analog_mv: voltages at the analog inputs.
+        analog_mv: functions that measure the voltages at the analog inputs.
     """
 
     def __init__(self, motion: Motion, pole_pairs: int, rad_s_per_rpm: Callable[[], float], seed: int) -> None:
         self.captured_qc = 0
-        self.analog_mv = [0, 0]
+        self.analog_mv: list[Callable[[], float]] = [lambda: 0.0, lambda: 0.0]
         self._motion = motion
         self._axis = motion.axis
         self._pole_pairs = pole_pairs
@@ -56,8 +56,8 @@ class Measurements:
             "hall_sensor_pattern": self._hall_pattern,
             "system_state": lambda: _ROTOR_KNOWN | (_CURRENT_LIMITED if motion.regulator.limited else 0),
             "captured_position": lambda: _int32(self.captured_qc),
-            "analog_input_1": lambda: _int16(self.analog_mv[0]),
-            "analog_input_2": lambda: _int16(self.analog_mv[1]),
+            "analog_input_1": lambda: _int16(self.analog_mv[0]()),
+            "analog_input_2": lambda: _int16(self.analog_mv[1]()),
         }
 
     def _rpm(self, speed_rad_s: float) -> int:

@@ -14,27 +14,23 @@ of mass.
 
 from __future__ import annotations
 
-from math import cos, hypot, sin
+from math import hypot
 from random import Random
 
 from canhelm.errors import ConfigError
+from drivers.simulated.body import GRAVITY_M_S2, BodyWorld
 from drivers.simulated.motor import WheelDrive
 from drivers.simulated.tyre import DAMPING_S, Contact
 from drivers.simulated.wheel_pair import Pair, Wheel
-from drivers.simulated.world import STEP_S, Axis
+from drivers.simulated.world import STEP_S
 from profiles.schema import PairedSteerGeometry, Profile, SimulationConfig
 
-GRAVITY_M_S2 = 9.81
 LOAD_SHIFT_S = 0.05
 """Time constant with which wheel loads follow the body's acceleration (assumed)."""
-REST_SPEED = 1e-5
-"""Speed [m/s, rad/s] below which a motion counts as rest."""
-REST_STEPS = 50
-"""Steps at rest, half a swing of the body on its tyres, after which the world stands still."""
 
 
-class Max2dWorld:
-    """The MAX2D on a level floor; a :class:`drivers.simulated.world.World` that also tells the truth to tests.
+class Max2dWorld(BodyWorld):
+    """The MAX2D on a level floor.
 
     Args:
         profile: a robot with a paired-steer vehicle and a simulation section.
@@ -64,7 +60,8 @@ class Max2dWorld:
             for name in vehicle.wheels
         }
         """Wheels by the names of their drives, in the order rear right, rear left, front left, front right."""
-        self.axes: dict[str, Axis] = {name: wheel.drive.axis for name, wheel in self.wheels.items()}
+        drives = {name: wheel.drive for name, wheel in self.wheels.items()}
+        super().__init__(drives, vehicle.mass_kg, start, step_s)
         rear_right, rear_left, front_left, front_right = self.wheels.values()
         self._rear = Pair(vehicle, simulation, -1, rear_right, rear_left)
         self._front = Pair(vehicle, simulation, 1, front_right, front_left)
@@ -77,41 +74,13 @@ class Max2dWorld:
         }
         for name, brake in profile.brakes.items():
             self._braked[name].set_brake(engaged=brake.energise_to_release)
-        self._drives = tuple(wheel.drive for wheel in self.wheels.values())
-        self._place_body(vehicle, start)
-        self._step_s = step_s
-        self._origin_s: float | None = None
-        self._steps_done = 0
-        self._quiet_steps = REST_STEPS
-
-    def _place_body(self, vehicle: PairedSteerGeometry, start: tuple[float, float, float]) -> None:
-        self._mass_kg = vehicle.mass_kg
         self._yaw_inertia = vehicle.yaw_inertia_kg_m2
-        self._x_m, self._y_m, self._yaw_rad = start
-        self._cos, self._sin = cos(self._yaw_rad), sin(self._yaw_rad)
-        self._world_vx = self._world_vy = self._yaw_rate = 0.0
-        self._mean_load_n = vehicle.mass_kg * GRAVITY_M_S2 / 4.0
+        self._mean_load_n = load
         height = vehicle.centre_of_mass_height_m
         width = vehicle.pivot_track_m + 2.0 * vehicle.contact_offset_m
         self._shift_x = height / (2.0 * vehicle.wheelbase_m)
         self._shift_y = height / (2.0 * width)
         self._shift_x_n = self._shift_y_n = 0.0
-
-    @property
-    def moving(self) -> bool:
-        """False while everything is at rest and every torque source repeats its demand."""
-        return self._quiet_steps < REST_STEPS
-
-    @property
-    def pose(self) -> tuple[float, float, float]:
-        """True pose of the centre: x_m, y_m, yaw_rad (unwrapped)."""
-        return self._x_m, self._y_m, self._yaw_rad
-
-    @property
-    def velocity(self) -> tuple[float, float, float]:
-        """True velocity in the body's frame: forward m/s, left m/s, yaw rate rad/s."""
-        vx, vy = self._body_velocity()
-        return vx, vy, self._yaw_rate
 
     @property
     def slip_ratio(self) -> tuple[float, ...]:
@@ -141,35 +110,6 @@ class Max2dWorld:
         self._braked[name].set_brake(engaged)
         self._quiet_steps = 0
 
-    def advance(self, now_s: float) -> None:
-        """Integrate up to ``now_s``; the first call sets the origin of time."""
-        if self._origin_s is None:
-            self._origin_s = now_s
-        steps = int((now_s - self._origin_s) / self._step_s + 1e-6)
-        if steps >= self._steps_done:
-            ahead_s = now_s - self._origin_s - steps * self._step_s
-            for drive in self._drives:
-                drive.axis.ahead_s = ahead_s
-        while self._steps_done < steps:
-            if self._a_demand_changes():
-                self._quiet_steps = 0
-            if self._quiet_steps < REST_STEPS:
-                self._step()
-                self._watch_for_rest()
-            elif all(axis.torque_source is None for axis in self.axes.values()):
-                self._steps_done = steps
-                return
-            self._steps_done += 1
-
-    def _a_demand_changes(self) -> bool:
-        """Ask every drive for its demand in the coming step; True when one differs from the last."""
-        step = self._step_s
-        changed = False
-        for drive in self._drives:
-            if drive.ask(step):
-                changed = True
-        return changed
-
     def _step(self) -> None:
         """Integrate one step: forces by the old velocities, then velocities, then positions."""
         dt = self._step_s
@@ -179,19 +119,10 @@ class Max2dWorld:
         front.roll(vx, vy, self._yaw_rate, dt)
         force_x = rear.force_x_n + front.force_x_n
         force_y = rear.force_y_n + front.force_y_n
-        self._turn_body(dt)
-        c, s = self._cos, self._sin
-        per_mass = dt / self._mass_kg
-        self._world_vx += (force_x * c - force_y * s) * per_mass
-        self._world_vy += (force_x * s + force_y * c) * per_mass
-        self._x_m += self._world_vx * dt
-        self._y_m += self._world_vy * dt
-        if self._yaw_rate != 0.0:
-            self._yaw_rad += self._yaw_rate * dt
-            self._cos, self._sin = cos(self._yaw_rad), sin(self._yaw_rad)
+        self._move(force_x, force_y, self._turn_pairs(dt), dt)
         self._shift_loads(force_x, force_y, dt)
 
-    def _turn_body(self, dt: float) -> None:
+    def _turn_pairs(self, dt: float) -> float:
         """Yaw acceleration of the body with the pairs that are held, and turning of the pairs that are not."""
         inertia = self._yaw_inertia
         moment = 0.0
@@ -203,7 +134,7 @@ class Max2dWorld:
         acceleration = moment / inertia
         self._rear.turn(acceleration, dt)
         self._front.turn(acceleration, dt)
-        self._yaw_rate += acceleration * dt
+        return acceleration
 
     def _shift_loads(self, force_x: float, force_y: float, dt: float) -> None:
         """Let the wheel loads follow the body's acceleration: back when speeding up, outward in a bend."""
@@ -217,33 +148,13 @@ class Max2dWorld:
         front.left.load_n = mean - back - right
         front.right.load_n = mean - back + right
 
-    def _body_velocity(self) -> tuple[float, float]:
-        """Velocity of the centre, forward and left [m/s]."""
-        c, s = self._cos, self._sin
-        return self._world_vx * c + self._world_vy * s, self._world_vy * c - self._world_vx * s
-
-    def _watch_for_rest(self) -> None:
-        """Count the steps at rest; after enough of them take the last imperceptible motion away."""
-        if not self._is_slow():
-            self._quiet_steps = 0
-            return
-        self._quiet_steps += 1
-        if self._quiet_steps == REST_STEPS:
-            self._come_to_rest()
-
-    def _is_slow(self) -> bool:
-        """Whether nothing moves faster than what counts as rest."""
-        if not (-REST_SPEED < self._world_vx < REST_SPEED and -REST_SPEED < self._world_vy < REST_SPEED):
-            return False
-        motions = (self._yaw_rate, self._rear.rate_rad_s, self._front.rate_rad_s, *(d.rim_m_s for d in self._drives))
-        return all(-REST_SPEED < motion < REST_SPEED for motion in motions)
+    def _motions(self) -> tuple[float, ...]:
+        return (*super()._motions(), self._rear.rate_rad_s, self._front.rate_rad_s)
 
     def _come_to_rest(self) -> None:
         """Set every speed to zero."""
-        self._world_vx = self._world_vy = self._yaw_rate = 0.0
+        super()._come_to_rest()
         self._rear.rate_rad_s = self._front.rate_rad_s = 0.0
-        for drive in self._drives:
-            drive.stop()
 
 
 def _parts_of(profile: Profile) -> tuple[PairedSteerGeometry, SimulationConfig]:

@@ -6,18 +6,26 @@ import asyncio
 from functools import partial
 from random import Random
 
+from drivers.simulated.body import BodyWorld
 from drivers.simulated.brake import SimulatedBrake
 from drivers.simulated.bus import SimulatedBus
 from drivers.simulated.encoder import SimulatedEncoder
 from drivers.simulated.epos import SimulatedEpos
 from drivers.simulated.max2d import Max2dWorld
 from drivers.simulated.node import SimulatedNode
-from profiles.schema import BrakeConfig, Profile
+from drivers.simulated.omni import OmniWorld
+from profiles.schema import BrakeConfig, OmniGeometry, Profile
 
 _BOOT_DELAY_S = (0.05, 0.15)
 """Shortest and longest time from power-up to the boot-up message (assumed)."""
 _WATCH_S = 0.01
 """Longest time that moving things are left unobserved."""
+
+
+def make_world(profile: Profile, seed: int) -> BodyWorld:
+    """The physics of a profile's vehicle. Raises ConfigError where it cannot be simulated."""
+    kind = OmniWorld if isinstance(profile.vehicle, OmniGeometry) else Max2dWorld
+    return kind(profile, seed)
 
 
 class SimulatedNetwork:
@@ -41,7 +49,7 @@ class SimulatedNetwork:
 
     def __init__(self, profile: Profile, medium: SimulatedBus, seed: int) -> None:
         random = Random(seed)
-        self.world = Max2dWorld(profile, seed)
+        self.world = make_world(profile, seed)
         self.drives = {
             name: SimulatedEpos(
                 medium.port(name),
@@ -58,6 +66,11 @@ class SimulatedNetwork:
             for name, config in profile.encoders.items()
         }
         self.brakes = {name: self._brake(name, config) for name, config in profile.brakes.items()}
+        sensor = self.world.accelerometer if isinstance(self.world, OmniWorld) else None
+        if sensor is not None and profile.accelerometer is not None:
+            for axis in range(2):
+                read = partial(sensor.voltage_mv, axis)
+                self.drives[profile.accelerometer.drive].connect_analog_input(axis + 1, read)
         self._watch: asyncio.TimerHandle | None = None
         for drive in self.drives.values():
             drive.on_power_stage = self._on_power_stage

@@ -1,0 +1,156 @@
+"""What the simulated robots have in common: a rigid body on a level floor, integrated in fixed steps, and its rest."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from math import cos, sin
+
+from drivers.simulated.motor import WheelDrive
+from drivers.simulated.world import Axis
+
+GRAVITY_M_S2 = 9.81
+REST_SPEED = 1e-5
+"""Speed [m/s, rad/s] below which a motion counts as rest."""
+REST_STEPS = 50
+"""Steps at rest, half a swing of the body on its tyres, after which the world stands still."""
+
+
+class BodyWorld(ABC):
+    """A robot's body; a :class:`drivers.simulated.world.World` that also tells the truth to tests.
+
+    Args:
+        drives: motor, gear and wheel by the names of the drives.
+        mass_kg: of the robot.
+        start: pose of the centre (x_m, y_m, yaw_rad).
+        step_s: integration step.
+    """
+
+    def __init__(
+        self, drives: Mapping[str, WheelDrive], mass_kg: float, start: tuple[float, float, float], step_s: float
+    ) -> None:
+        self.axes: dict[str, Axis] = {name: drive.axis for name, drive in drives.items()}
+        self._drives = tuple(drives.values())
+        self._mass_kg = mass_kg
+        self._x_m, self._y_m, self._yaw_rad = start
+        self._cos, self._sin = cos(self._yaw_rad), sin(self._yaw_rad)
+        self._world_vx = self._world_vy = self._yaw_rate = 0.0
+        self._step_s = step_s
+        self._origin_s: float | None = None
+        self._steps_done = 0
+        self._quiet_steps = REST_STEPS
+
+    @property
+    def moving(self) -> bool:
+        """False while everything is at rest and every torque source repeats its demand."""
+        return self._quiet_steps < REST_STEPS
+
+    @property
+    def time_s(self) -> float:
+        """Time of the simulation: 0 at the first look."""
+        return self._steps_done * self._step_s
+
+    @property
+    def pose(self) -> tuple[float, float, float]:
+        """True pose of the centre: x_m, y_m, yaw_rad (unwrapped)."""
+        return self._x_m, self._y_m, self._yaw_rad
+
+    @property
+    def velocity(self) -> tuple[float, float, float]:
+        """True velocity in the body's frame: forward m/s, left m/s, yaw rate rad/s."""
+        vx, vy = self._body_velocity()
+        return vx, vy, self._yaw_rate
+
+    @property
+    @abstractmethod
+    def slip_ratio(self) -> tuple[float, ...]:
+        """True slip ratio of each wheel: (rim speed - rolling speed) over the faster of the two."""
+
+    @property
+    @abstractmethod
+    def slip_angle_rad(self) -> tuple[float, ...]:
+        """True slip angle of each wheel, positive where the contact point drifts to the left of its heading."""
+
+    @abstractmethod
+    def heading_rad(self, pair: str) -> float:
+        """True heading of a wheel pair by its encoder's name."""
+
+    @abstractmethod
+    def set_brake(self, name: str, engaged: bool) -> None:
+        """Engage or release a brake from the last advanced time on."""
+
+    @abstractmethod
+    def _step(self) -> None:
+        """Integrate one step."""
+
+    def advance(self, now_s: float) -> None:
+        """Integrate up to ``now_s``; the first call sets the origin of time."""
+        if self._origin_s is None:
+            self._origin_s = now_s
+        steps = int((now_s - self._origin_s) / self._step_s + 1e-6)
+        if steps >= self._steps_done:
+            ahead_s = now_s - self._origin_s - steps * self._step_s
+            for drive in self._drives:
+                drive.axis.ahead_s = ahead_s
+        while self._steps_done < steps:
+            if self._a_demand_changes():
+                self._quiet_steps = 0
+            if self._quiet_steps < REST_STEPS:
+                self._step()
+                self._watch_for_rest()
+            elif all(axis.torque_source is None for axis in self.axes.values()):
+                self._steps_done = steps
+                return
+            self._steps_done += 1
+
+    def _a_demand_changes(self) -> bool:
+        """Ask every drive for its demand in the coming step; True when one differs from the last."""
+        step = self._step_s
+        changed = False
+        for drive in self._drives:
+            if drive.ask(step):
+                changed = True
+        return changed
+
+    def _move(self, force_x: float, force_y: float, yaw_acceleration: float, dt: float) -> None:
+        """Move the body for one step by a force in its own frame."""
+        self._yaw_rate += yaw_acceleration * dt
+        c, s = self._cos, self._sin
+        per_mass = dt / self._mass_kg
+        self._world_vx += (force_x * c - force_y * s) * per_mass
+        self._world_vy += (force_x * s + force_y * c) * per_mass
+        self._x_m += self._world_vx * dt
+        self._y_m += self._world_vy * dt
+        if self._yaw_rate != 0.0:
+            self._yaw_rad += self._yaw_rate * dt
+            self._cos, self._sin = cos(self._yaw_rad), sin(self._yaw_rad)
+
+    def _body_velocity(self) -> tuple[float, float]:
+        """Velocity of the centre, forward and left [m/s]."""
+        c, s = self._cos, self._sin
+        return self._world_vx * c + self._world_vy * s, self._world_vy * c - self._world_vx * s
+
+    def _watch_for_rest(self) -> None:
+        """Count the steps at rest; after enough of them take the last imperceptible motion away."""
+        if not self._is_slow():
+            self._quiet_steps = 0
+            return
+        self._quiet_steps += 1
+        if self._quiet_steps == REST_STEPS:
+            self._come_to_rest()
+
+    def _motions(self) -> tuple[float, ...]:
+        """Speeds that have to be small for rest, beside the body's own."""
+        return (self._yaw_rate, *(drive.rim_m_s for drive in self._drives))
+
+    def _is_slow(self) -> bool:
+        """Whether nothing moves faster than what counts as rest."""
+        if not (-REST_SPEED < self._world_vx < REST_SPEED and -REST_SPEED < self._world_vy < REST_SPEED):
+            return False
+        return all(-REST_SPEED < motion < REST_SPEED for motion in self._motions())
+
+    def _come_to_rest(self) -> None:
+        """Set every speed to zero."""
+        self._world_vx = self._world_vy = self._yaw_rate = 0.0
+        for drive in self._drives:
+            drive.stop()
