@@ -17,10 +17,7 @@ from vcan_tests.vectors_loader import read_vectors, vector_paths
 
 Case = dict[str, Any]
 
-LEFT_OUT: Final = frozenset(
-    {
-    }
-)
+LEFT_OUT: Final[frozenset[str]] = frozenset()
 """Kinds whose loops do not exist."""
 
 
