@@ -10,8 +10,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import errno
+import importlib.util
 import logging
 import math
+import sys
 import threading
 import time
 from pathlib import PurePath
@@ -43,12 +45,15 @@ _ERROR_CLASS_BUS_OFF = 0x40  # linux/can/error.h
 
 
 def python_can_bus(interface: str, channel: str, bit_rate: int) -> PythonCanBus:
-    """The bus of one of python-can's interfaces. Raises UsageError where it has no such interface."""
+    """The bus of one of python-can's interfaces. Raises UsageError where it has none such, or a package is missing."""
     if interface not in can.VALID_INTERFACES:
         known = sorted({*can.VALID_INTERFACES, *NO_CAN_INTERFACES})
         small = interface.lower()
         remedy = f"write {small}" if small in known else f"use one of {', '.join(known)}"
         raise UsageError(f"there is no CAN interface {interface!r}", value=interface, remedy=remedy)
+    if interface == "slcan" and importlib.util.find_spec("serial") is None:
+        install = f"{sys.executable} -m pip install 'canhelm[slcan]'"
+        raise UsageError("the package pyserial is missing, which slcan needs", value=interface, remedy=install)
     return PythonCanBus(interface, channel, bit_rate)
 
 

@@ -6,13 +6,14 @@ import asyncio
 import contextlib
 import logging
 import os
+import sys
 import tty
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
 import pytest
 
-from canhelm.errors import BusOff
+from canhelm.errors import BusOff, UsageError
 from drivers.bus import python_can
 from drivers.bus.contract import RTR_FLAG
 from drivers.bus.python_can import PythonCanBus, python_can_bus
@@ -174,3 +175,10 @@ async def test_an_empty_line_does_not_hold_up_the_loop(adapter: Adapter) -> None
         bus._receive_all()
     assert loop.time() - began < 0.05
     await bus.close()
+
+
+def test_without_pyserial_the_line_that_installs_it_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "serial", None)
+    with pytest.raises(UsageError, match="pyserial is missing") as refused:
+        python_can_bus("slcan", "/dev/ttyUSB0", 500_000)
+    assert refused.value.remedy == f"{sys.executable} -m pip install 'canhelm[slcan]'"
