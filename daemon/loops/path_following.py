@@ -99,7 +99,7 @@ def published_circle_curvature(pose: Pose, target: Point) -> float:
 
 
 def published_target(piece: Piece, along_m: float, look_ahead_m: float) -> Point:
-    """The target point as printed (eq. 3.2, 3.4): on a circle by a reflection that takes the place of a rotation."""
+    """The target point as printed (eq. 3.2, 3.4): on a circle turned by a matrix with a wrong sign."""
     if abs(piece.curvature) < STRAIGHT:
         return piece.point(along_m + look_ahead_m)
     cx, cy = piece.centre()
