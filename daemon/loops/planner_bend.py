@@ -14,8 +14,10 @@ from daemon.loops.planner_arcs import Bend, Ramp, Vector, ramp_between
 ROUNDING: Final = 1e-12
 STRAIGHT: Final = 1e-9
 """Below this length of the shortest costate, relative to the duration, a bend is two straight changes of velocity."""
-TRIALS: Final = 20
-RATIOS: Final = 1.2, 3.0, 10.0
+TRIALS: Final = 15
+LEAST_STEP: Final = 1e-1
+"""Part of a Newton step that is taken even where it does not help."""
+RATIOS: Final = 1.2, 1.6, 3.0
 """Lengths of the costate at the end of a bend over that at its start, tried as guesses."""
 
 
@@ -76,7 +78,7 @@ def bends(travel: Vector, start: Vector, end: Vector) -> Iterator[Bend]:
     across = (x * missed[1] - y * missed[0]) / length
     turn = min(1.0, 12 * abs(across) / (length * length)) or 1.0
     for ratio in RATIOS:
-        near, far = math.asinh(2 * (1 - 1 / ratio) / turn), math.log(ratio)
+        near, far = math.asinh((1 - 1 / ratio) / turn), math.log(ratio)
         for guess in (near, near + far), (-near - far, -near), (-far, far):
             if arc := _bend_near(travel, start, end, -math.copysign(1.0, across), guess):
                 yield arc
@@ -140,7 +142,7 @@ def _speed_rises(arc: Bend, time: float) -> bool:
 def solve_pair(
     missing: Callable[[float, float], Vector], guess: Vector, tolerance: float, longest: float
 ) -> Vector | None:
-    """The two numbers for which nothing is missing: Newton's method, its steps halved until they help.
+    """The two numbers for which nothing is missing: Newton's method, its steps halved while they do not help.
 
     Args:
         missing: what is missing with two numbers; infinite where they are not allowed.
@@ -164,10 +166,9 @@ def solve_pair(
             return None
         dx, dy = (rx * yy - ry * xy) / determinant, (xx * ry - yx * rx) / determinant
         factor = min(1.0, longest / (math.hypot(dx, dy) or 1.0))
-        while factor > 1e-3:
-            rx, ry = missing(x + factor * dx, y + factor * dy)
-            if math.hypot(rx, ry) < error:
-                break
+        rx, ry = missing(x + factor * dx, y + factor * dy)
+        while not math.hypot(rx, ry) < error and factor > LEAST_STEP:
             factor /= 2
+            rx, ry = missing(x + factor * dx, y + factor * dy)
         x, y = x + factor * dx, y + factor * dy
     return None

@@ -21,6 +21,8 @@ LIKELY: Final = 1.1
 """A way that takes no more than this longer than a lower bound is taken for the fastest without a wider search."""
 MAY_CRUISE: Final = 0.7
 """Speed of the corner above which a cruise at the speed limit is sought."""
+CRUISES: Final = 0.999
+"""Speed at the start above which its heading may be that of the cruise."""
 SAME: Final = 1e-6
 """Distance of two corners that are one."""
 IN_LINE: Final = 1e-13
@@ -56,6 +58,10 @@ def _ways(travel: Vector, start: Vector, end: Vector) -> Iterator[tuple[str, Seq
     """Ways that exist, the likely ones first."""
     middle = (start[0] + end[0]) / 2, (start[1] + end[1]) / 2
     root = math.sqrt(math.hypot(*travel)) or 1.0
+    if math.hypot(*start) > CRUISES and (
+        found := cruise(half_turn, travel, start, end, math.atan2(start[1], start[0]))
+    ):
+        yield "turns", turn_arcs(start, end, *found)
     known: list[Vector] = []
     for guess in (travel[0] / root, travel[1] / root), middle, (-middle[0], -middle[1]):
         via = corner(travel, start, end, guess)

@@ -89,11 +89,11 @@ def test_planning_anew_on_the_way_does_not_put_off_the_arrival() -> None:
             assert plan_motion(plan.at(now), problem.goal, problem.limits, now).ends <= plan.ends * 1.03
 
 
-def test_planning_anew_in_every_cycle_arrives_as_well() -> None:
-    for problem in random_problems(12, SEED):
+def test_planning_anew_in_every_cycle_arrives_at_rest_in_time() -> None:
+    for problem in random_problems(20, SEED)[::2]:
         state, now = problem.start, 0.0
         plan = plan_motion(state, problem.goal, problem.limits)
-        latest = plan.ends * 1.1 + CYCLE_S
+        latest = plan.ends * 1.02 + CYCLE_S
         while plan.ends > now + CYCLE_S and now < latest:
             step = follow(plan, now, state, CYCLE_S)
             state = moved(state, step.acceleration_m_s2, step.angular_acceleration_rad_s2, CYCLE_S)
