@@ -166,8 +166,38 @@ _VEHICLE = (
     Method(
         "drive.rotate",
         "Turn about the own centre.",
-        (Param("rate_deg_s", "number", "yaw rate", "deg/s"), _WAIT),
-        "motion",
+        (Param("rate_deg_s", "number", "yaw rate", "deg/s"), _TIME, _WAIT),
+        "motion, x_m, y_m, heading_deg, duration_s",
+        needs_lease=True,
+        ends_by="duration_s",
+    ),
+    Method(
+        "drive.to",
+        "Drive to a place, heading and velocity of the frame that began with the daemon.",
+        (
+            Param("x_m", "number", "forward of the start", "m"),
+            Param("y_m", "number", "to the left of the start", "m"),
+            Param("heading_deg", "number", "counter-clockwise; as it is where left out", "deg", default=None),
+            Param("end_vx_m_s", "number", "velocity at the goal", "m/s", default=0.0),
+            Param("end_vy_m_s", "number", "velocity at the goal", "m/s", default=0.0),
+            Param(
+                "speed_m_s",
+                "number",
+                "no faster than; the vehicle's limit where left out",
+                "m/s",
+                default=None,
+                minimum=0.001,
+            ),
+            Param(
+                "planner",
+                "string",
+                "the time-optimal one, or that of the Turtle robot's report",
+                default="optimal",
+                choices=("optimal", "published"),
+            ),
+            _WAIT,
+        ),
+        "motion, result, x_m, y_m, heading_deg, duration_s, error_m, heading_error_deg, least_safety_factor",
         needs_lease=True,
     ),
     Method(
@@ -176,6 +206,7 @@ _VEHICLE = (
         (
             _angle("direction_deg", "direction in the robot's frame"),
             _SPEED,
+            Param("yaw_rate_deg_s", "number", "turn while driving, on vehicles that can", "deg/s", default=0.0),
             Param("valid_for_ms", "number", "age at which it is too old", "ms", 300.0, 20.0, 1000.0),
         ),
         "motion",

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from cyclopts import App
+from typing import Annotated, Any
+
+from cyclopts import App, Parameter
 
 from daemon.cli.motion import run_motion
 from daemon.cli.options import DEFAULT, NoWait, Options
@@ -55,14 +57,67 @@ def turn(
 
 
 @app.command
-def rotate(rate_deg_s: float, /, *, no_wait: NoWait = False, options: Options = DEFAULT) -> int:
-    """Turn about the own centre, on vehicles that can.
+def rotate(
+    rate_deg_s: float,
+    /,
+    *,
+    duration: float | None = None,
+    no_wait: NoWait = False,
+    options: Options = DEFAULT,
+) -> int:
+    """Turn about the own centre, on vehicles that can; for a time or until Ctrl-C or `canhelm stop`.
 
-    Example: `canhelm drive rotate 20`
+    Example: `canhelm drive rotate 20 --duration 3`
 
     Parameters
     ----------
     rate_deg_s: float
         Degrees a second, counter-clockwise positive.
+    duration: float
+        Seconds.
     """
-    return run_motion(options, "drive.rotate", no_wait=no_wait, rate_deg_s=rate_deg_s)
+    return run_motion(options, "drive.rotate", no_wait=no_wait, rate_deg_s=rate_deg_s, duration_s=duration)
+
+
+@app.command
+def to(
+    x: float,
+    y: float,
+    heading_deg: float | None = None,
+    /,
+    *,
+    end_velocity: tuple[float, float] = (0.0, 0.0),
+    speed: float | None = None,
+    published: Annotated[bool, Parameter(negative=())] = False,
+    no_wait: NoWait = False,
+    options: Options = DEFAULT,
+) -> int:
+    """Drive to a place in the shortest time, on vehicles that can; place and heading are reached together.
+
+    Example: `canhelm drive to 2 -0.5 90 --end-velocity 0.4 0`
+
+    Parameters
+    ----------
+    x: float
+        Metres forward of where the daemon began to count.
+    y: float
+        Metres to the left of it.
+    heading_deg: float
+        Degrees, counter-clockwise positive; without it the heading stays.
+    end_velocity: tuple[float, float]
+        m/s along x and y at the goal; the robot comes to rest behind it.
+    speed: float
+        m/s, no faster than this.
+    published: bool
+        By the planner and the traction controller that the Turtle robot's report prints, for comparison.
+    """
+    params: dict[str, Any] = {
+        "x_m": x,
+        "y_m": y,
+        "heading_deg": heading_deg,
+        "end_vx_m_s": end_velocity[0],
+        "end_vy_m_s": end_velocity[1],
+        "speed_m_s": speed,
+        "planner": "published" if published else "optimal",
+    }
+    return run_motion(options, "drive.to", no_wait=no_wait, **params)

@@ -173,6 +173,8 @@ class PairedSteerVehicle(Vehicle):
             return steer_target(PAIR_NAMES.index(pair), math.radians(params["angle_deg"]))
         speed = float(params["speed_m_s"])
         if method == "drive.set":
+            if params.get("yaw_rate_deg_s"):
+                raise Refused(why_not_rotate(), remedy="leave the yaw rate out")
             return direction_target(math.radians(params["direction_deg"]), speed)
         duration = float(params["duration_s"])
         if method == "drive.parallel":

@@ -31,6 +31,7 @@ class Vehicle(ABC):
     Args:
         profile: the robot.
         drives, encoders, brakes: its devices, in the order of the loops.
+        wheel_acceleration_m_s2: what the gate allows the wheels; None: what the vehicle's centre may do.
 
     Attributes:
         methods: names of the ``drive.*`` methods and of others that this vehicle has.
@@ -45,16 +46,20 @@ class Vehicle(ABC):
         drives: tuple[Drive, ...],
         encoders: tuple[SteeringEncoder, ...] = (),
         brakes: tuple[Brake, ...] = (),
+        wheel_acceleration_m_s2: float | None = None,
     ) -> None:
         self.profile = profile
         self.drives = drives
         self.encoders = encoders
         self.brakes = brakes
         self.zero = Command((0.0,) * len(drives))
-        self._gate = Gate(profile.limits, profile.vehicle)
+        self._gate = Gate(profile.limits, profile.vehicle, wheel_acceleration_m_s2)
 
     def measure(self, now_s: float) -> Measurement:
         """The newest readings of all devices."""
+        return self._readings(now_s)
+
+    def _readings(self, now_s: float, acceleration_m_s2: tuple[float, float] | None = None) -> Measurement:
         return Measurement(
             now_s,
             tuple([drive.speed_m_s for drive in self.drives]),
@@ -62,6 +67,7 @@ class Vehicle(ABC):
             tuple([encoder.heading_rad for encoder in self.encoders]),
             tuple([brake.state is BrakeState.ENGAGED for brake in self.brakes]),
             tuple([brake.state is BrakeState.RELEASED for brake in self.brakes]),
+            acceleration_m_s2,
         )
 
     def gate(

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from canhelm.errors import ConfigError
+from daemon.runtime.omni_vehicle import OmniVehicle
 from daemon.runtime.paired_steer_vehicle import PairedSteerVehicle
 from daemon.runtime.vehicle import BareDrives, Vehicle
 from drivers.devices import Devices
-from profiles.schema import PairedSteerGeometry, Profile
+from profiles.schema import OmniGeometry, PairedSteerGeometry, Profile
 
 
 def make_vehicle(profile: Profile, devices: Devices) -> Vehicle:
@@ -21,4 +22,6 @@ def make_vehicle(profile: Profile, devices: Devices) -> Vehicle:
             tuple(devices.encoders[name] for name in geometry.encoders),
             tuple(devices.brakes[name] for name in geometry.brakes),
         )
+    if isinstance(geometry, OmniGeometry):
+        return OmniVehicle(profile, tuple(devices.drives[name] for name in geometry.wheels), devices.accelerometer)
     raise ConfigError(f"profile {profile.name}: no loops for a vehicle of type {type(geometry).__name__}")

@@ -11,8 +11,8 @@ from random import Random
 
 from profiles.schema import AccelerometerConfig
 
-BANDWIDTH_S = 0.003
-"""Time constant of the sensor's filter (assumed: 50 Hz)."""
+BANDWIDTH_S = 0.012
+"""Time constant of the filter that keeps what is faster than the control cycle from its samples (assumed)."""
 
 
 class SimulatedAccelerometer:

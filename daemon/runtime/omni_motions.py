@@ -1,0 +1,222 @@
+"""Motions of a robot on omni-wheels, from their begin to rest."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from typing import Any, Protocol
+
+from canhelm.errors import DeviceFault
+from daemon.loops.accelerometer import CentreAcceleration
+from daemon.loops.measurement import Command, Measurement
+from daemon.loops.omni_drive import OmniLaw, OmniOdometry, OmniRecord
+from daemon.loops.omni_guide import Twist, TwistGuide
+from daemon.loops.planner import PlanarState, Result
+from daemon.runtime.motions import Motion
+
+STREAM_END_S = 2.0
+"""A stream whose last value has been too old for this long is over."""
+FAILED = (Result.INVALID, Result.GOAL_TOO_FAST)
+STANDING: Twist = (0.0, 0.0, 0.0)
+
+
+class Senses(Protocol):
+    """What the vehicle knows of its own motion."""
+
+    odometry: OmniOdometry
+    acceleration: CentreAcceleration | None
+
+
+class OmniMotion(Motion):
+    """A motion by the law.
+
+    Args:
+        senses: pose, and acceleration of the centre.
+        law: of its own.
+
+    Attributes:
+        record: of the last step; None before the first.
+        least_factor: smallest safety factor so far.
+        slip_steps: steps in which slip was detected.
+    """
+
+    def __init__(self, kind: str, drives: tuple[str, ...], lease: str | None, senses: Senses, law: OmniLaw) -> None:
+        super().__init__(kind, drives, lease)
+        self.record: OmniRecord | None = None
+        self.least_factor = 1.0
+        self.slip_steps = 0
+        self._senses = senses
+        self._law = law
+
+    def step(self, measurement: Measurement, dt_s: float) -> Command:
+        """One step of the law; once stopped it brings the robot to rest."""
+        if self.stop_reason:
+            self._law.stop()
+        centre = self._senses.acceleration
+        command, record = self._law.step(self._senses.odometry.pose, centre.centre if centre else None, dt_s)
+        self.record = record
+        if not record.stopping:
+            self.least_factor = min(self.least_factor, record.guidance.safety_factor)
+            self.slip_steps += any(record.guidance.slip)
+        if record.guidance.result in FAILED:
+            remedy = "`canhelm status` shows pose and limits; give another goal"
+            self.fail(DeviceFault(f"{self.kind}: {record.guidance.result.value}", remedy=remedy))
+        elif record.done:
+            self.on_done(measurement, record)
+        return command
+
+    def on_done(self, measurement: Measurement, record: OmniRecord) -> None:
+        """The law is done."""
+        self.finish(self.numbers(measurement))
+
+    def numbers(self, measurement: Measurement) -> dict[str, Any]:
+        """Where the robot is, and how it went."""
+        pose = self._senses.odometry.pose
+        return {
+            "x_m": round(pose.x_m, 4),
+            "y_m": round(pose.y_m, 4),
+            "heading_deg": round(math.degrees(pose.yaw_rad), 3),
+            "duration_s": round(measurement.time_s - self.begun_s, 3),
+            "least_safety_factor": round(self.least_factor, 3),
+            "slip_steps": self.slip_steps,
+        }
+
+    def progress(self) -> dict[str, Any]:
+        """Case, result so far, limits in force, ETA, traction and error of following."""
+        record = self.record
+        if record is None:
+            return {"phase": "enabling"}
+        guidance = record.guidance
+        limits, eta = guidance.limits, guidance.eta_s
+        return {
+            "phase": "stopping" if record.stopping else guidance.result.value,
+            "case": guidance.case,
+            "eta_s": round(eta, 3) if math.isfinite(eta) else None,
+            "speed_m_s": round(math.hypot(guidance.next.vx, guidance.next.vy), 4),
+            "speed_limit_m_s": round(limits.speed, 4),
+            "acceleration_limit_m_s2": round(limits.acceleration, 4),
+            "yaw_rate_limit_deg_s": round(math.degrees(limits.rate), 3),
+            "safety_factor": round(guidance.safety_factor, 3),
+            "slip": list(guidance.slip),
+            "correction": guidance.correction,
+            "error_m": round(math.hypot(record.error[0], record.error[1]), 4),
+        }
+
+
+class GoalMotion(OmniMotion):
+    """To a goal; where it is passed with a velocity the robot comes to rest behind it.
+
+    Args:
+        goal: in the odometry's frame.
+    """
+
+    def __init__(
+        self, kind: str, drives: tuple[str, ...], lease: str | None, senses: Senses, law: OmniLaw, goal: PlanarState
+    ) -> None:
+        super().__init__(kind, drives, lease, senses, law)
+        self._goal = goal
+        self._reached: dict[str, Any] | None = None
+
+    def on_done(self, measurement: Measurement, record: OmniRecord) -> None:
+        """At the goal, or at rest behind it."""
+        if self._reached is None:
+            self._reached = self._at_goal(measurement)
+        if record.stopping or math.hypot(self._goal.vx, self._goal.vy) == 0.0:
+            self.finish(self._reached)
+        else:
+            self._law.stop()
+
+    def _at_goal(self, measurement: Measurement) -> dict[str, Any]:
+        pose, goal = self._senses.odometry.pose, self._goal
+        turn = math.remainder(goal.heading - pose.yaw_rad, math.tau)
+        return {
+            "result": Result.ARRIVED.value,
+            **self.numbers(measurement),
+            "error_m": round(math.hypot(goal.x - pose.x_m, goal.y - pose.y_m), 4),
+            "heading_error_deg": round(math.degrees(turn), 3),
+        }
+
+
+class TwistMotion(OmniMotion):
+    """A twist for a time, or until stopped.
+
+    Args:
+        guide: the law's.
+        duration_s: time after which it ends; None: until stopped.
+    """
+
+    def __init__(
+        self,
+        kind: str,
+        drives: tuple[str, ...],
+        lease: str | None,
+        senses: Senses,
+        law: OmniLaw,
+        guide: TwistGuide,
+        duration_s: float | None,
+    ) -> None:
+        super().__init__(kind, drives, lease, senses, law)
+        self._guide = guide
+        self._remaining_s = duration_s
+
+    def step(self, measurement: Measurement, dt_s: float) -> Command:
+        """The twist until the time is over, then rest."""
+        if self._remaining_s is not None:
+            self._remaining_s -= dt_s
+            if self._remaining_s <= 0.0:
+                self._guide.twist = STANDING
+        return super().step(measurement, dt_s)
+
+    def on_done(self, measurement: Measurement, record: OmniRecord) -> None:
+        """At rest: over, unless it stands because that was asked for."""
+        if record.stopping or (self._remaining_s is not None and self._remaining_s <= 0.0):
+            super().on_done(measurement, record)
+
+
+class TwistStream(OmniMotion):
+    """Driving by a stream of twists (``drive.set``); the robot comes to rest when the last one is too old.
+
+    Args:
+        guide: the law's.
+        valid_for_s: age at which the first value is too old.
+    """
+
+    streaming = True
+
+    def __init__(
+        self,
+        kind: str,
+        drives: tuple[str, ...],
+        lease: str | None,
+        senses: Senses,
+        law: OmniLaw,
+        guide: TwistGuide,
+        valid_for_s: float,
+    ) -> None:
+        super().__init__(kind, drives, lease, senses, law)
+        self._guide = guide
+        self._age_s = 0.0
+        self.take(guide.twist, valid_for_s)
+
+    def take(self, twist: Twist, valid_for_s: float) -> None:
+        """A new value."""
+        self._wanted = twist
+        self._valid_for_s = valid_for_s
+        self._taken_s = asyncio.get_running_loop().time()
+
+    def step(self, measurement: Measurement, dt_s: float) -> Command:
+        """Follow the newest value, or come to rest where it is too old."""
+        self._age_s = measurement.time_s - self._taken_s
+        self._guide.twist = self._wanted if self._age_s <= self._valid_for_s else STANDING
+        if not self.stop_reason and self._age_s > self._valid_for_s + STREAM_END_S:
+            self.stop("no new value came")
+        return super().step(measurement, dt_s)
+
+    def on_done(self, measurement: Measurement, record: OmniRecord) -> None:
+        """At rest: over only when it was stopped."""
+        if record.stopping:
+            super().on_done(measurement, record)
+
+    def progress(self) -> dict[str, Any]:
+        """As of any motion, and the age of the last value."""
+        return {**super().progress(), "value_age_ms": round(self._age_s * 1e3)}

@@ -1,0 +1,225 @@
+"""The vehicle on omni-wheels (Turtle): its motions on the law ``daemon.loops.omni_drive``."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+from canhelm.errors import LimitExceeded, UsageError
+from daemon.loops.accelerometer import Accelerometer, CentreAcceleration, Mounting
+from daemon.loops.measurement import Measurement
+from daemon.loops.omni_drive import OmniLaw, OmniOdometry, omni_kinematics
+from daemon.loops.omni_guide import GoalGuide, Guide, PublishedGuide, Signals, Twist, TwistGuide
+from daemon.loops.planner import FARTHEST, PlanarLimits, PlanarState
+from daemon.loops.slip import THRESHOLD_M_S2
+from daemon.loops.traction import Traction
+from daemon.runtime.motions import Motion
+from daemon.runtime.omni_motions import GoalMotion, OmniMotion, TwistMotion, TwistStream
+from daemon.runtime.rest import AT_REST_M_S
+from daemon.runtime.vehicle import Vehicle
+from drivers.contract import Accelerometer as Sensor
+from drivers.contract import Drive, DriveState
+from profiles.schema import OmniGeometry, Profile
+
+SLOWEST_M_S = 1e-3
+"""Slowest speed limit that is planned with."""
+_ROUNDING = 1e-9
+
+
+class OmniVehicle(Vehicle):
+    """A robot on omni-wheels, in the order of its profile.
+
+    Args:
+        profile: the robot.
+        drives: of its wheels.
+        sensor: its accelerometer; without one there is no traction loop.
+
+    Attributes:
+        traction: whether motions by the time-optimal planner heed the floor's grip.
+    """
+
+    methods = ("drive.to", "drive.parallel", "drive.rotate", "drive.set")
+
+    def __init__(self, profile: Profile, drives: tuple[Drive, ...], sensor: Sensor | None) -> None:
+        slowest = min(profile.drives[drive.name].acceleration_m_s2 for drive in drives)
+        super().__init__(profile, drives, wheel_acceleration_m_s2=slowest)
+        assert isinstance(profile.vehicle, OmniGeometry)
+        limits = profile.limits
+        self.traction = True
+        self.limits = PlanarLimits(
+            limits.speed_m_s,
+            limits.acceleration_m_s2,
+            math.radians(limits.yaw_rate_deg_s),
+            math.radians(limits.yaw_acceleration_deg_s2),
+        )
+        self._kinematics = omni_kinematics(profile.vehicle)
+        self.odometry = OmniOdometry(self._kinematics)
+        self._names = tuple(drive.name for drive in drives)
+        self._sensor = sensor
+        self._period_s = 1.0 / profile.network.cycle_hz
+        config = profile.accelerometer
+        mounting = Mounting(config.x_m, config.y_m, math.radians(config.rotation_deg)) if config else Mounting()
+        self._centre = Accelerometer(mounting)
+        self.acceleration: CentreAcceleration | None = None
+        self._last_s = -math.inf
+
+    # --- measuring ---------------------------------------------------------------------------------------------
+
+    def measure(self, now_s: float) -> Measurement:
+        """The newest readings; pose and acceleration of the centre by them."""
+        reading = self._sensor.acceleration_m_s2 if self._sensor else None
+        measurement = self._readings(now_s, reading)
+        self.odometry.update(measurement)
+        dt_s, self._last_s = min(now_s - self._last_s, 5 * self._period_s), now_s
+        self.acceleration = None
+        if reading is not None:
+            self.acceleration = self._centre.step(reading, self.odometry.motion[2], dt_s, self._stands(measurement))
+        return measurement
+
+    def _stands(self, measurement: Measurement) -> bool:
+        """Whether the robot certainly stands: no wheel turns, no drive has power."""
+        if any(drive.state is not DriveState.DISABLED for drive in self.drives):
+            return False
+        return all(abs(speed) < AT_REST_M_S for speed in measurement.wheel_speed_m_s)
+
+    # --- motions -----------------------------------------------------------------------------------------------
+
+    def motion(self, method: str, params: dict[str, Any], lease: str | None) -> Motion:
+        """The motion of ``drive.to``, ``drive.parallel``, ``drive.rotate`` or ``drive.set``."""
+        if method == "drive.to":
+            return self._to(params, lease)
+        if method == "drive.parallel":
+            return self._parallel(params, lease)
+        twist = self._twist(method, params)
+        law, guide = self._on_twist(twist)
+        if method == "drive.set":
+            return TwistStream(method, self._names, lease, self, law, guide, float(params["valid_for_ms"]) / 1e3)
+        return TwistMotion(method, self._names, lease, self, law, guide, params.get("duration_s"))
+
+    def update(
+        self, method: str, params: dict[str, Any], lease: str | None, motions: list[Motion]
+    ) -> dict[str, Any] | None:
+        """A further value of a stream that this holder drives by."""
+        if method != "drive.set":
+            return None
+        for motion in motions:
+            if isinstance(motion, TwistStream) and motion.lease == lease and not motion.stop_reason:
+                motion.take(self._twist(method, params), float(params["valid_for_ms"]) / 1e3)
+                return {"motion": motion.identity}
+        return None
+
+    def to_goal(
+        self,
+        goal: PlanarState,
+        limits: PlanarLimits,
+        lease: str | None,
+        *,
+        kind: str = "drive.to",
+        published: bool = False,
+        signals: Signals | None = None,
+        threshold_m_s2: float = THRESHOLD_M_S2,
+    ) -> OmniMotion:
+        """A motion to a goal in the odometry's frame.
+
+        Args:
+            goal: place, heading and velocity there.
+            limits: of this motion, within the vehicle's.
+            lease: who holds it.
+            kind: the method that asks for it.
+            published: by the planner and the traction controller of the Turtle robot's report.
+            signals: accelerations that these detect slip by, instead of the robot's own.
+            threshold_m_s2: of slip, for these.
+
+        Raises:
+            UsageError: a number is none, or too large.
+            LimitExceeded: a limit is beyond the vehicle's, or the velocity at the goal beyond the limit.
+        """
+        self._check(goal, limits)
+        guide: Guide
+        if published:
+            guide = PublishedGuide(goal, limits, self._period_s, signals, threshold_m_s2)
+        else:
+            guide = GoalGuide(goal, limits, self._new_traction(limits.acceleration))
+        return GoalMotion(kind, self._names, lease, self, self._law(guide), goal)
+
+    def _to(self, params: dict[str, Any], lease: str | None) -> Motion:
+        heading, speed = params.get("heading_deg"), params.get("speed_m_s")
+        yaw = self.odometry.pose.yaw_rad if heading is None else math.radians(heading)
+        goal = PlanarState(
+            params["x_m"], params["y_m"], yaw, params.get("end_vx_m_s", 0.0), params.get("end_vy_m_s", 0.0)
+        )
+        limits = self.limits if speed is None else replace(self.limits, speed=float(speed))
+        return self.to_goal(goal, limits, lease, published=params.get("planner") == "published")
+
+    def _parallel(self, params: dict[str, Any], lease: str | None) -> Motion:
+        """The way that speed and duration make, as a goal."""
+        pose, speed = self.odometry.pose, float(params["speed_m_s"])
+        angle, way = pose.yaw_rad + math.radians(params["angle_deg"]), speed * float(params["duration_s"])
+        goal = PlanarState(pose.x_m + way * math.cos(angle), pose.y_m + way * math.sin(angle), pose.yaw_rad)
+        limits = replace(self.limits, speed=max(abs(speed), SLOWEST_M_S))
+        return self.to_goal(goal, limits, lease, kind="drive.parallel")
+
+    def _twist(self, method: str, params: dict[str, Any]) -> Twist:
+        """The twist that a method asks for. Raises LimitExceeded or UsageError."""
+        rate = math.radians(params.get("yaw_rate_deg_s") or params.get("rate_deg_s") or 0.0)
+        speed = float(params["speed_m_s"]) if method == "drive.set" else 0.0
+        angle = math.radians(params["direction_deg"]) if method == "drive.set" else 0.0
+        twist = speed * math.cos(angle), speed * math.sin(angle), rate
+        if not all(map(math.isfinite, twist)):
+            raise UsageError("a direction, speed or rate is not a finite number", remedy="give finite numbers")
+        _at_most("speed", abs(speed), self.limits.speed, "m/s", "speed_m_s")
+        _at_most("yaw rate", math.degrees(abs(rate)), math.degrees(self.limits.rate), "deg/s", "yaw_rate_deg_s")
+        return twist
+
+    def _on_twist(self, twist: Twist) -> tuple[OmniLaw, TwistGuide]:
+        guide = TwistGuide(twist, self.limits, self._new_traction(self.limits.acceleration))
+        return self._law(guide), guide
+
+    def _new_traction(self, acceleration_m_s2: float) -> Traction | None:
+        return Traction(acceleration_m_s2) if self.traction and self._sensor is not None else None
+
+    def _law(self, guide: Guide) -> OmniLaw:
+        odometry = self.odometry
+        return OmniLaw(self._kinematics, guide, self.limits, odometry.pose, odometry.motion)
+
+    def _check(self, goal: PlanarState, limits: PlanarLimits) -> None:
+        numbers = (goal.x, goal.y, goal.heading, goal.vx, goal.vy, limits.speed, limits.acceleration)
+        if not all(abs(number) < FARTHEST for number in numbers) or limits.speed <= 0 or limits.acceleration <= 0:
+            raise UsageError(
+                "a place, heading, velocity or limit is not a finite number, or too large, or a limit not positive",
+                remedy=f"give numbers below {FARTHEST:g}",
+            )
+        _at_most("speed", limits.speed, self.limits.speed, "m/s", "speed_m_s")
+        _at_most("acceleration", limits.acceleration, self.limits.acceleration, "m/s^2", "acceleration_m_s2")
+        _at_most("speed at the goal", math.hypot(goal.vx, goal.vy), limits.speed, "m/s", "speed_m_s")
+
+    def status(self) -> dict[str, Any]:
+        """Odometry, motion and acceleration of the centre."""
+        pose, (vx, vy, rate) = self.odometry.pose, self.odometry.motion
+        centre = self.acceleration.centre if self.acceleration else None
+        return {
+            "type": OmniGeometry.type,
+            "methods": list(self.methods),
+            "odometry": {
+                "x_m": round(pose.x_m, 4),
+                "y_m": round(pose.y_m, 4),
+                "yaw_deg": round(math.degrees(pose.yaw_rad), 3),
+            },
+            "velocity": {
+                "forward_m_s": round(vx, 4),
+                "left_m_s": round(vy, 4),
+                "yaw_rate_deg_s": round(math.degrees(rate), 3),
+            },
+            "acceleration_m_s2": None if centre is None else [round(value, 3) for value in centre],
+        }
+
+
+def _at_most(what: str, value: float, limit: float, unit: str, name: str) -> None:
+    if value > limit * (1 + _ROUNDING):
+        raise LimitExceeded(
+            f"a {what} of {value:g} {unit} is beyond the limit",
+            value=round(value, 6),
+            limit=f"{name} {limit:g}",
+            remedy=f"ask for at most {limit:g} {unit}",
+        )
