@@ -23,6 +23,8 @@ Motion = tuple[float, float, float]
 
 BREAKAWAY_M_S: Final = 0.01
 """Rim speed at which dry friction is all there."""
+SWEEPS: Final = 4
+"""Times that the impulses of all rows are computed a cycle; what is left, the next cycle takes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +115,8 @@ class SlipObserver:
         body: that the wheels move.
         drives: of the wheels.
         rows: of the wheels.
-        still: rows along which the robot cannot move at all (across wheels that do not roll sideways).
+        still: rows along which the robot cannot move at all (across wheels that do not roll sideways): there the floor
+            gives whatever impulse that takes.
         tuning: of the robot.
     """
 
@@ -130,8 +133,7 @@ class SlipObserver:
         self._rows = tuple(rows)
         self._still = tuple(still)
         self._tuning = ObserverTuning() if tuning is None else tuning
-        every = (*self._rows, *self._still)
-        self._weight = tuple(1 / max(math.fsum(row[axis] ** 2 for row in every), 1e-9) for axis in range(3))
+        self._weight = tuple(1 / max(math.fsum(row[axis] ** 2 for row in self._rows), 1e-9) for axis in range(3))
         none = (0.0,) * len(self._rows)
         self._last = Observed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), none, none, none, (False,) * len(self._rows))
         self._speeds: tuple[float, ...] = ()
@@ -193,12 +195,21 @@ class SlipObserver:
         less = 1 - math.exp(-dt / self._tuning.distrust_s)
         x = y = turn = 0.0
         gains = [less if slipping else gain for slipping in self._last.slipping]
-        rows = [*zip(self._rows, speeds, gains, strict=True), *((row, 0.0, gain) for row in self._still)]
-        for row, speed, weight in rows:
+        for row, speed, weight in zip(self._rows, speeds, gains, strict=True):
             missing = weight * (speed - _rolling(row, motion))
             x, y, turn = x + row[0] * missing, y + row[1] * missing, turn + row[2] * missing
         of_x, of_y, of_turn = self._weight
-        return (motion[0] + of_x * x, motion[1] + of_y * y, motion[2] + of_turn * turn)
+        return self._held(motion[0] + of_x * x, motion[1] + of_y * y, motion[2] + of_turn * turn)
+
+    def _held(self, vx: float, vy: float, rate: float) -> Motion:
+        """The motion after the impulses that the floor gives across the wheels, one row after the other."""
+        per_mass, per_inertia = 1 / self._body.mass_kg, 1 / self._body.yaw_inertia_kg_m2
+        for cos, sin, lever in self._still * SWEEPS:
+            mobility = per_mass * (cos * cos + sin * sin) + per_inertia * lever * lever
+            impulse = (cos * vx + sin * vy + lever * rate) / mobility
+            vx, vy = vx - per_mass * cos * impulse, vy - per_mass * sin * impulse
+            rate -= per_inertia * lever * impulse
+        return (vx, vy, rate)
 
     def _judged(self, motion: Motion, slip: Sequence[float]) -> tuple[bool, ...]:
         tuning = self._tuning
