@@ -34,6 +34,10 @@ class FollowingTuning:
 class Limit(StrEnum):
     """What kept a law from commanding what it wanted."""
 
+    CURVATURE = "curvature"
+    """Of the reference unit's way back to the path."""
+    BENDING = "bending"
+    """The bending angle that it may have while driving backwards."""
     STEERING = "steering"
     """The steering angle."""
 
@@ -62,19 +66,21 @@ class FollowingStep:
         remaining_m: way to the end of the section; negative beyond it.
         backward: driving direction.
         errors: against the path.
-        target: the point headed for.
-        curvature: of the auxiliary circle, positive with its centre to the left of the heading [1/m].
+        target: the point headed for; None in a law that has none.
+        heading_target_rad: the heading's error that is wanted for now; None in a law that has none.
+        curvature: that the reference unit shall drive, positive with its centre to the left of the heading [1/m].
         bending_target_rad: for driving backwards with a trailer, else None.
         wanted_steering_rad: before the limit.
         steering_rad: the command.
-        limit: that changed the command, if any.
+        limit: that changed the command, if any; of several the last in the chain.
     """
 
     meeting: Meeting
     remaining_m: float
     backward: bool
     errors: FollowingErrors
-    target: Point
+    target: Point | None
+    heading_target_rad: float | None
     curvature: float
     bending_target_rad: float | None
     wanted_steering_rad: float
@@ -142,12 +148,67 @@ def errors_on(piece: Piece, meeting: Meeting, pose: Pose, bending_rad: float, hi
     )
 
 
-class PathFollower:
-    """Follows one section of a path after the other.
+class SectionFollower:
+    """Where on a path the vehicle is: one section after the other.
 
     Attributes:
         section: the one being followed.
     """
+
+    def __init__(self, vehicle: ArticulatedVehicle, path: Path) -> None:
+        """Begin at the path's first piece.
+
+        Raises:
+            ValueError: the vehicle's trailers cannot be steered backwards.
+        """
+        self._vehicle, self._path = vehicle, path
+        self._hitch = reversing_hitch(vehicle)
+        self.section = 0
+        self._meeting = Meeting(0, 0.0, 0.0)
+
+    def next_section(self) -> bool:
+        """Go on to the next section, once the vehicle rests at the end of this one; False after the last."""
+        if self.section + 1 == len(self._path.sections):
+            return False
+        self.section += 1
+        self._meeting = Meeting(self._path.sections[self.section][0], 0.0, 0.0)
+        return True
+
+    def _meet(self, pose: Pose) -> Meeting:
+        self._meeting = self._path.meet(self.section, self._meeting, pose.x_m, pose.y_m)
+        return self._meeting
+
+    def _commanded(
+        self,
+        errors: FollowingErrors,
+        curvature: float,
+        wanted_steering_rad: float,
+        *,
+        target: Point | None = None,
+        heading_target_rad: float | None = None,
+        bending_target_rad: float | None = None,
+        limit: Limit | None = None,
+    ) -> FollowingStep:
+        """The step at the meeting point, its steering limited."""
+        meeting = self._meeting
+        steering = clamp(wanted_steering_rad, self._vehicle.max_steering_rad)
+        return FollowingStep(
+            meeting=meeting,
+            remaining_m=self._path.remaining(self.section, meeting.piece, meeting.along_m),
+            backward=self._path.pieces[meeting.piece].backward,
+            errors=errors,
+            target=target,
+            heading_target_rad=heading_target_rad,
+            curvature=curvature,
+            bending_target_rad=bending_target_rad,
+            wanted_steering_rad=wanted_steering_rad,
+            steering_rad=steering,
+            limit=limit if steering == wanted_steering_rad else Limit.STEERING,
+        )
+
+
+class PathFollower(SectionFollower):
+    """The law of the thesis."""
 
     def __init__(
         self, vehicle: ArticulatedVehicle, path: Path, tuning: FollowingTuning, published: bool = False
@@ -163,18 +224,8 @@ class PathFollower:
         Raises:
             ValueError: the vehicle's trailers cannot be steered backwards.
         """
-        self._vehicle, self._path, self._tuning, self._published = vehicle, path, tuning, published
-        self._hitch = reversing_hitch(vehicle)
-        self.section = 0
-        self._meeting = Meeting(0, 0.0, 0.0)
-
-    def next_section(self) -> bool:
-        """Go on to the next section, once the vehicle rests at the end of this one; False after the last."""
-        if self.section + 1 == len(self._path.sections):
-            return False
-        self.section += 1
-        self._meeting = Meeting(self._path.sections[self.section][0], 0.0, 0.0)
-        return True
+        super().__init__(vehicle, path)
+        self._tuning, self._published = tuning, published
 
     def step(self, pose: Pose, bending_rad: float) -> FollowingStep:
         """One steering command.
@@ -183,7 +234,7 @@ class PathFollower:
             pose: of the reference unit: driving forwards the truck's, backwards the trailer's.
             bending_rad: measured; without meaning for a truck alone.
         """
-        meeting = self._meeting = self._path.meet(self.section, self._meeting, pose.x_m, pose.y_m)
+        meeting = self._meet(pose)
         piece = self._path.pieces[meeting.piece]
         target = self._target(piece, meeting)
         curvature = published_circle_curvature(pose, target) if self._published else circle_curvature(pose, target)
@@ -193,19 +244,8 @@ class PathFollower:
             wanted = bending_law(self._vehicle, self._tuning.bending_gain, bending_target, bending_rad)
         else:
             wanted = self._vehicle.steering(curvature)
-        steering = clamp(wanted, self._vehicle.max_steering_rad)
-        return FollowingStep(
-            meeting=meeting,
-            remaining_m=self._path.remaining(self.section, meeting.piece, meeting.along_m),
-            backward=piece.backward,
-            errors=errors_on(piece, meeting, pose, bending_rad, self._hitch),
-            target=target,
-            curvature=curvature,
-            bending_target_rad=bending_target,
-            wanted_steering_rad=wanted,
-            steering_rad=steering,
-            limit=None if steering == wanted else Limit.STEERING,
-        )
+        errors = errors_on(piece, meeting, pose, bending_rad, self._hitch)
+        return self._commanded(errors, curvature, wanted, target=target, bending_target_rad=bending_target)
 
     def _target(self, piece: Piece, meeting: Meeting) -> Point:
         if self._published:

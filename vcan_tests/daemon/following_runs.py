@@ -3,25 +3,44 @@
 from __future__ import annotations
 
 import math
+import random
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Final, Protocol
+from itertools import product
+from typing import Final
 
+from daemon.loops.cascade_following import CascadeFollower, CascadeTuning
 from daemon.loops.odometry import Pose
-from daemon.loops.path import Piece
-from daemon.loops.path_following import FollowingStep
-from vcan_tests.daemon.semitrailer_plant import SemitrailerPlant
+from daemon.loops.path import Path, Piece
+from daemon.loops.path_following import FollowingStep, FollowingTuning, PathFollower
+from vcan_tests.daemon.semitrailer_plant import (
+    CIRCLE_BACKWARDS,
+    LINE_BACKWARDS,
+    SEMITRAILER,
+    Errors,
+    SemitrailerPlant,
+    placed,
+)
 
 SPEED_M_S: Final = 0.2
 NEAR_M: Final = 0.01
 NEAR_RAD: Final = math.radians(1)
 
 
-class Follower(Protocol):
-    """A law."""
+Law = Callable[[Pose, float, float, float], FollowingStep]
+"""A command from the pose of the reference unit, bending angle, steering angle and speed."""
 
-    def step(self, pose: Pose, bending_rad: float) -> FollowingStep:
-        """One command."""
-        ...
+
+def thesis_law(piece: Piece, tuning: FollowingTuning | None = None, published: bool = False) -> Law:
+    """The thesis' law on one piece."""
+    follower = PathFollower(SEMITRAILER, Path([piece]), tuning or FollowingTuning(), published)
+    return lambda pose, bending, steering, speed: follower.step(pose, bending)
+
+
+def cascade_law(piece: Piece, rate_rad_s: float | None = None, tuning: CascadeTuning | None = None) -> Law:
+    """The cascade on one piece, with a steering of this rate."""
+    rate = math.inf if rate_rad_s is None else rate_rad_s
+    return CascadeFollower(SEMITRAILER, Path([piece]), tuning or CascadeTuning(), rate).step
 
 
 @dataclass
@@ -44,18 +63,13 @@ class Run:
         """Largest errors of position, heading and bending angle."""
         return (_largest(self.position_m), _largest(self.heading_rad), _largest(self.bending_rad))
 
-    @property
-    def iae_m2(self) -> float:
-        """Integral of the position's error over the way of a run at ``SPEED_M_S`` in steps of 50 ms."""
-        return sum(map(abs, self.position_m)) * SPEED_M_S * 0.05
-
 
 def _largest(values: list[float]) -> float:
     return max(map(abs, values))
 
 
 def drive(
-    law: Follower,
+    law: Law,
     plant: SemitrailerPlant,
     piece: Piece,
     duration_s: float,
@@ -68,7 +82,8 @@ def drive(
     speed = -speed_m_s if piece.backward else speed_m_s
     last_off = -1
     for instant in range(round(duration_s / period_s) + 1):
-        step = law.step(plant.trailer if piece.backward else plant.truck, plant.bending_rad)
+        reference = plant.trailer if piece.backward else plant.truck
+        step = law(reference, plant.bending_rad, plant.steering_rad, speed)
         errors = step.errors
         run.position_m.append(sign * errors.position_m)
         run.heading_rad.append(errors.heading_rad)
@@ -79,3 +94,37 @@ def drive(
     settled = last_off + 1
     run.settle_m = speed_m_s * period_s * settled if settled < len(run.position_m) else None
     return run
+
+
+State = tuple[Piece, Errors]
+
+
+def forty_states() -> list[State]:
+    """The initial errors of the thesis' section 6.2 on line and circle: single ones, and those of Table B.1 on both."""
+    signs = (1, -1)
+    single = [Errors(position_m=sign * size) for size in (0.1, 0.2) for sign in signs]
+    single += [Errors(heading_rad=math.radians(sign * size)) for size in (5, 10) for sign in signs]
+    single += [Errors(bending_rad=math.radians(sign * size)) for size in (5, 10) for sign in signs]
+    turned = [math.radians(sign * 10) for sign in signs]
+    combined = [Errors(position_m=sign * y, heading_rad=t) for y, sign, t in product((0.1, 0.2), signs, turned)]
+    return list(product((LINE_BACKWARDS, CIRCLE_BACKWARDS), single + combined))
+
+
+def random_states(count: int, seed: int) -> list[State]:
+    """Errors of position within 0.25 m, of heading and bending angle within 15 degrees; line and circle in turn."""
+    chance = random.Random(seed)
+    angle = math.radians(15)
+    paths = (LINE_BACKWARDS, CIRCLE_BACKWARDS)
+    return [
+        (
+            paths[number % 2],
+            Errors(chance.uniform(-0.25, 0.25), chance.uniform(-angle, angle), chance.uniform(-angle, angle)),
+        )
+        for number in range(count)
+    ]
+
+
+def campaign(law: Callable[[Piece, float | None], Law], states: list[State], rate_deg_s: float | None) -> list[Run]:
+    """One run of 20 s from each state, at ``SPEED_M_S`` and 50 ms."""
+    rate = None if rate_deg_s is None else math.radians(rate_deg_s)
+    return [drive(law(piece, rate), placed(piece, errors, rate), piece, 20.0) for piece, errors in states]

@@ -21,7 +21,7 @@ from daemon.loops.path_following import (
     published_circle_curvature,
     published_target,
 )
-from vcan_tests.daemon.following_runs import drive
+from vcan_tests.daemon.following_runs import drive, thesis_law
 from vcan_tests.daemon.semitrailer_plant import (
     CIRCLE_BACKWARDS,
     LINE_BACKWARDS,
@@ -63,7 +63,7 @@ def test_backwards_the_bending_angle_goes_to_its_target(bending: float, target: 
 def test_the_printed_curvature_drives_away_from_the_line() -> None:
     """Equation 3.6 as printed steers to the wrong side: from 0.1 m it is metres away after 4 m."""
     plant = placed(LINE_BACKWARDS, Errors(position_m=0.1))
-    law = PathFollower(SEMITRAILER, Path([LINE_BACKWARDS]), TUNING, published=True)
+    law = thesis_law(LINE_BACKWARDS, published=True)
     assert drive(law, plant, LINE_BACKWARDS, 20.0).worst[0] > 2
 
 
@@ -80,7 +80,7 @@ def test_the_printed_target_of_a_line_is_right() -> None:
 def test_put_right_the_law_returns_to_the_line() -> None:
     """The straight-line bound for 0.2 m of section 6.2.1: 0.2 m, 19 and 38 degrees."""
     plant = placed(LINE_BACKWARDS, Errors(position_m=0.2))
-    run = drive(PathFollower(SEMITRAILER, Path([LINE_BACKWARDS]), TUNING), plant, LINE_BACKWARDS, 20.0)
+    run = drive(thesis_law(LINE_BACKWARDS), plant, LINE_BACKWARDS, 20.0)
     position, heading, bending = run.worst
     assert position == pytest.approx(0.2, abs=0.001)
     assert math.degrees(heading) == pytest.approx(19, abs=0.5)
@@ -92,7 +92,7 @@ def test_put_right_the_law_returns_to_the_line() -> None:
     "piece", [LINE_BACKWARDS, CIRCLE_BACKWARDS, forwards(LINE_BACKWARDS), forwards(CIRCLE_BACKWARDS)]
 )
 def test_without_error_the_vehicle_stays_on_the_path(piece: Piece) -> None:
-    run = drive(PathFollower(SEMITRAILER, Path([piece]), TUNING), placed(piece, Errors()), piece, 20.0)
+    run = drive(thesis_law(piece), placed(piece, Errors()), piece, 20.0)
     assert run.worst[0] < 1e-6
 
 
@@ -100,7 +100,7 @@ def test_left_and_right_are_alike() -> None:
     runs = []
     for sign in (1, -1):
         errors = Errors(0.1 * sign, 0.05 * sign, -0.1 * sign)
-        law = PathFollower(SEMITRAILER, Path([LINE_BACKWARDS]), TUNING)
+        law = thesis_law(LINE_BACKWARDS)
         runs.append(drive(law, placed(LINE_BACKWARDS, errors), LINE_BACKWARDS, 10.0))
     assert runs[0].position_m == pytest.approx([-value for value in runs[1].position_m], abs=1e-9)
 

@@ -12,7 +12,7 @@ from daemon.loops.articulated import hitch_point
 from daemon.loops.odometry import Pose
 from daemon.loops.path import Path, Piece, arc
 from daemon.loops.path_following import FollowingErrors, FollowingTuning, PathFollower
-from vcan_tests.daemon.following_runs import drive
+from vcan_tests.daemon.following_runs import drive, thesis_law
 from vcan_tests.daemon.semitrailer_plant import (
     CIRCLE_BACKWARDS,
     LINE_BACKWARDS,
@@ -119,7 +119,7 @@ def check_path_law(case: Case) -> None:
     x, y = given["P"]
     pose, bending = Pose(x, y, given["theta"]), given["delta_is"]
     step = follower.step(pose, bending or 0.0)
-    assert list(step.target) == near(expected["target"])
+    assert step.target == near(tuple(expected["target"]))
     assert step.curvature == near(expected["kappa"], relative=1e-9)
     if expected["r_kk"] is not None:
         r = 1 / step.curvature
@@ -145,7 +145,7 @@ def check_closed_loop(case: Case) -> None:
     piece = piece if backward else forwards(piece)
     errors = Errors(given["xi_y0"], math.radians(given["xi_theta0_deg"]), math.radians(given["xi_delta0_deg"]))
     plant = placed(piece, errors, None if rate is None else math.radians(rate))
-    law = PathFollower(SEMITRAILER, Path([piece]), FollowingTuning(given["c_v"], given["c_p"]))
+    law = thesis_law(piece, FollowingTuning(given["c_v"], given["c_p"]))
     period = given["control_period"]
     run = drive(law, plant, piece, given["T"], period, speed_m_s=given["speed"])
     position, heading, bending = run.worst
