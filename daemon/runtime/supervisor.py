@@ -140,16 +140,19 @@ class Supervisor:
             self.leases.client(motion.lease)
         for other in self.motions.values():
             if set(other.drives) & set(motion.drives):
-                holder = f"held by {self.leases.client(other.lease)}" if other.lease else "handed to the daemon"
                 raise Refused(
-                    f"motion {other.identity} ({other.kind}, {holder}) is running",
+                    f"motion {other.identity} ({other.kind}, {self._holder(other)}) is running",
                     remedy="wait for it, or `canhelm stop`",
                 )
         self.brakes.require_released(motion.drives)
         self.vehicle.require_free(motion)
         motion.identity = str(next(self._numbers))
         self.motions[motion.identity] = motion
+        LOGGER.info("motion %s (%s) begins, %s", motion.identity, motion.kind, self._holder(motion))
         self._tasks.spawn(self._carry_out(motion), MOTION)
+
+    def _holder(self, motion: Motion) -> str:
+        return f"held by {self.leases.client(motion.lease)}" if motion.lease else "handed to the daemon"
 
     async def _carry_out(self, motion: Motion) -> None:
         drives = [self.devices.drives[name] for name in motion.drives]
@@ -168,6 +171,7 @@ class Supervisor:
             await self._leave_as_found(drives, enabled_here)
             self.motions.pop(motion.identity, None)
             motion.closed.set()
+            LOGGER.info("motion %s (%s) is over: %s", motion.identity, motion.kind, motion.ended.exception() or "done")
 
     async def _leave_as_found(self, drives: list[Drive], enabled_here: list[Drive]) -> None:
         await self.until_rest()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import math
 
 import pytest
@@ -174,3 +175,18 @@ async def test_a_current_beyond_the_motors_is_refused_with_a_remedy() -> None:
         with pytest.raises(LimitExceeded, match="20000 mA") as refused:
             await robot.call("motor.current", node=1, current_ma=20_000.0)
         assert refused.value.remedy is not None
+
+
+async def test_the_log_tells_whose_a_motion_was_and_how_it_ended(caplog: pytest.LogCaptureFixture) -> None:
+    async with running_robot() as robot:
+        with caplog.at_level(logging.INFO):
+            await robot.call("drive.parallel", angle_deg=0.0, speed_m_s=0.2, duration_s=0.5)
+            moving = asyncio.create_task(robot.call("motor.velocity", node=1, velocity_rpm=100.0))
+            await robot.until(lambda: bool(robot.app.supervisor.motions))
+            await robot.call("stop")
+            await asyncio.wait([moving])
+    told = [message for message in caplog.messages if message.startswith("motion ")]
+    assert told[0] == "motion 1 (drive.parallel) begins, held by test"
+    assert told[1] == "motion 1 (drive.parallel) is over: done"
+    assert told[3].startswith("motion 2 (motor.velocity) is over: the motion was stopped: ")
+    assert isinstance(moving.exception(), Refused)
