@@ -47,12 +47,12 @@ class CascadeTuning:
     approach_curvature: float = 0.669
     max_approach_rad: float = 0.309
     sharpness: float = 9.5
-    heading_gain: float = 3.34
-    max_curvature: float = 3.9
+    heading_gain: float = 3.36
+    max_curvature: float = 3.6
     max_bending_rad: float = 1.1
-    bending_gain: float = 13.8
-    rate_share: float = 0.74
-    lead_s: float = 0.214
+    bending_gain: float = 14.0
+    rate_share: float = 0.73
+    lead_s: float = 0.217
 
 
 class _Errors(NamedTuple):
