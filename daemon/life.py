@@ -6,12 +6,14 @@ import asyncio
 import logging
 import signal
 from collections.abc import Awaitable, Callable
+from pathlib import Path
 
 from canhelm.errors import CanhelmError, Refused
 from daemon.app import App
 from daemon.runtime.notify import ServiceManager
 from daemon.runtime.vehicle import VehicleState
 from drivers.contract import Drive
+from profiles.kept import keep
 from profiles.schema import Profile
 
 LOGGER = logging.getLogger("canhelm")
@@ -26,6 +28,7 @@ class Life:
         make_app: makes the daemon for a profile. Raises CanhelmError where the profile does not fit the bus.
         load: reads and checks the profile anew. Raises ConfigError.
         manager: who started this process.
+        folder: where the profile is kept with which a daemon runs; None for nowhere.
 
     Attributes:
         app: the daemon that runs now.
@@ -34,11 +37,16 @@ class Life:
     app: App
 
     def __init__(
-        self, make_app: Callable[[Profile], App], load: Callable[[], Awaitable[Profile]], manager: ServiceManager
+        self,
+        make_app: Callable[[Profile], App],
+        load: Callable[[], Awaitable[Profile]],
+        manager: ServiceManager,
+        folder: Path | None = None,
     ) -> None:
         self._make_app = make_app
         self._load = load
         self._manager = manager
+        self._folder = folder
         self._turn = asyncio.Event()
         self._ending = False
         self._successor: App | None = None
@@ -117,6 +125,7 @@ class Life:
         manager = self._manager
         manager.sentence = lambda: app.service.sentence
         app.cycle.on_good = manager.good_cycle
+        self._keep(app.profile)
         try:
             await app.start()
             LOGGER.info("robot %s on %s, socket %s", app.profile.name, app.spec, app.server and app.server.path)
@@ -127,6 +136,13 @@ class Life:
         finally:
             doubtful = await app.close()
         return doubtful
+
+    def _keep(self, profile: Profile) -> None:
+        try:
+            if self._folder is not None:
+                keep(profile, self._folder)
+        except OSError as error:
+            LOGGER.warning("the profile can't be kept, so a clean-up will read its file: %s", error)
 
 
 def _farewell(doubtful: tuple[Drive, ...]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from typing import TYPE_CHECKING
 
 from canhelm.errors import CanhelmError, NodeAbsent, Timeout
@@ -21,7 +22,8 @@ LONGEST_S = 8.0
 def make_safe(*, profile: str, bus: str) -> int:
     """Stop all drives, engage their brakes and switch them off, after the daemon was killed. Not beside a running one.
 
-    The service does it at its every end; nothing changes where the daemon has ended in order.
+    The service does it at its every end, with the profile that the daemon had; nothing changes where the daemon has
+    ended in order.
 
     Example: `canhelm make-safe --profile max2d --bus socketcan:can0`
 
@@ -30,12 +32,15 @@ def make_safe(*, profile: str, bus: str) -> int:
         bus: The bus of the daemon: `socketcan:can0` or `rs232:/dev/ttyS0@115200`.
     """
     from daemon.cli.run import simulates
+    from profiles.kept import kept, runtime_folder
     from profiles.loader import load
 
     if simulates(bus):
         say("the network was simulated and has gone with its daemon")
         return 0
-    return asyncio.run(_within_time(load(profile).profile, bus))
+    folder = runtime_folder(os.environ)
+    robot = kept(folder) if folder else None
+    return asyncio.run(_within_time(robot or load(profile).profile, bus))
 
 
 async def _within_time(profile: Profile, spec: str) -> int:

@@ -96,12 +96,14 @@ async def _live(make_app: Callable[[Profile], App], source: str, robot: Profile)
     """The daemon's life; how it left the vehicle."""
     from daemon.life import Life
     from daemon.runtime.notify import ServiceManager
+    from profiles.kept import runtime_folder
     from profiles.loader import load
 
     async def load_anew() -> Profile:
         return (await asyncio.to_thread(load, source)).profile
 
-    life = Life(make_app, load_anew, ServiceManager.of(os.environ, os.getpid()))
+    manager = ServiceManager.of(os.environ, os.getpid())
+    life = Life(make_app, load_anew, manager, runtime_folder(os.environ))
     life.take_signals()
     return await life.run(robot)
 

@@ -15,6 +15,7 @@ from canhelm.errors import BusOff, CanhelmError, ConfigError, Refused
 from daemon.app import App
 from daemon.life import Life
 from daemon.runtime.notify import ServiceManager
+from profiles.kept import kept
 from profiles.loader import load
 from profiles.schema import Profile
 from vcan_tests.manager import Manager
@@ -28,12 +29,14 @@ class Daemon:
         life: what runs it.
         manager: what the service manager hears.
         found: the profile that a reload finds, or why there is none.
+        folder: where the profile is kept.
     """
 
     def __init__(self, path: Path) -> None:
         self.manager = Manager(path)
         self.found: Profile | CanhelmError = load("max2d").profile
-        self.life = Life(self._make_app, self._load, ServiceManager(str(path), 2.0))
+        self.folder = path.parent
+        self.life = Life(self._make_app, self._load, ServiceManager(str(path), 2.0), self.folder)
 
     def _make_app(self, profile: Profile) -> App:
         if profile.name == "unfit":
@@ -112,6 +115,25 @@ async def test_a_profile_with_mistakes_is_refused_and_the_daemon_goes_on(
         assert daemon.told().endswith(f"READY=1\nSTATUS=idle - {reason}")
         assert daemon.life.app is before
         assert "lab1.yaml:6" in caplog.text
+
+
+async def test_the_profile_with_which_a_daemon_runs_is_kept_for_a_clean_up(daemon: Daemon) -> None:
+    async with running(daemon):
+        assert kept(daemon.folder) == daemon.life.app.profile
+        daemon.found = renamed("other")
+        await daemon.life.reload()
+        await asyncio.sleep(1.0)
+        assert kept(daemon.folder) == daemon.life.app.profile
+        assert daemon.life.app.profile.name == "other"
+
+
+async def test_a_profile_that_can_not_be_kept_keeps_no_daemon_from_running(
+    daemon: Daemon, caplog: pytest.LogCaptureFixture
+) -> None:
+    (daemon.folder / "profile.json.new").mkdir()
+    async with running(daemon):
+        assert kept(daemon.folder) is None
+    assert "the profile can't be kept" in caplog.text
 
 
 async def test_a_profile_that_does_not_fit_the_bus_is_refused(daemon: Daemon) -> None:

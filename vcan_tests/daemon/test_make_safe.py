@@ -5,17 +5,19 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from pathlib import Path
 
 import msgspec
 import pytest
 
-from canhelm.errors import BusOff
+from canhelm.errors import BusOff, ConfigError
 from daemon.cli.main import main
 from daemon.cli.make_safe import secure
 from drivers.bus.python_can import PythonCanBus
 from drivers.canopen.master import Master
 from drivers.contract import BrakeState
 from drivers.epos.objects import OBJECTS
+from profiles.kept import keep
 from profiles.loader import load
 from profiles.schema import BrakeConfig, Profile
 from vcan_tests.robot import Robot, running_robot
@@ -167,3 +169,20 @@ def test_a_bus_that_is_missing_is_no_failure(
     monkeypatch.setattr(PythonCanBus, "open", refuse)
     assert main(["make-safe", "--profile", "max2d", "--bus", "slcan:/dev/ttyNONE"]) == 0
     assert "no drive can be reached: the adapter is missing" in capsys.readouterr().err
+
+
+def test_the_profile_that_the_daemon_had_goes_before_its_file(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    async def refuse(_: PythonCanBus) -> None:
+        raise BusOff("the adapter is missing", remedy="plug it in")
+
+    monkeypatch.setattr(PythonCanBus, "open", refuse)
+    spoilt = tmp_path / "spoilt.yaml"
+    spoilt.write_text("schema_version: 1\n")
+    command = ["make-safe", "--profile", str(spoilt), "--bus", "slcan:/dev/ttyNONE"]
+    assert main(command) == ConfigError.exit_code
+    monkeypatch.setenv("RUNTIME_DIRECTORY", str(tmp_path))
+    keep(load("max2d").profile, tmp_path)
+    assert main(command) == 0
+    assert "no drive can be reached" in capsys.readouterr().err
