@@ -7,6 +7,8 @@ PIP := $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check
 OUT ?= demo-out
 SERVICE_PYTHON ?= /usr/bin/python3
 PREFIX ?= /opt/canhelm
+PACKAGED = $(shell find canhelm daemon drivers profiles packaging systemd -type f ! -name '*.py[co]') \
+	docs/service.md pyproject.toml README.md CHANGELOG.md LICENSE
 PACKAGING = DESTDIR='$(DESTDIR)' PREFIX='$(PREFIX)' PYTHON='$(SERVICE_PYTHON)' PIP_PYTHON='$(VENV)/bin/python'
 
 .DEFAULT_GOAL := help
@@ -32,14 +34,17 @@ install: | $(VENV)/bin/pip ## the service on this machine (as root): /opt/canhel
 uninstall: ## take it away again; profiles, logs and state stay
 	$(PACKAGING) packaging/uninstall.sh
 
-deb: | $(VENV)/bin/pip ## the service as a Debian package, into dist/
-	$(PACKAGING) packaging/deb.sh
+deb: dist/.stamp-deb ## the service as a Debian package, into dist/
 
 lint: $(VENV)/.stamp-test ## style, types and import rules
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
 	$(VENV)/bin/lint-imports
+
+dist/.stamp-deb: $(PACKAGED) | $(VENV)/bin/pip
+	$(PACKAGING) packaging/deb.sh
+	@touch $@
 
 $(VENV)/bin/pip:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -65,11 +66,24 @@ def run_part(mark: str, timeout_s: float, pytest_options: list[str]) -> Part:
     """Runs the tests of one mark: the service's always in a guest, so that they can't harm this machine."""
     if mark == "vcan" and running.has_vcan():
         return run_here(mark, timeout_s, pytest_options)
+    if mark == "systemd":
+        build_package()
     print(f"booting the user-mode kernel for the {mark} tests", flush=True)
     command = pytest_command(mark, Path("/run/guest"), pytest_options)
     with exchange_folder() as exchange:
         outcome = run_in_guest(command, exchange, systemd=mark == "systemd", timeout_s=timeout_s)
         return part_of(mark, f"the user-mode kernel {outcome.kernel}", outcome.status, exchange)
+
+
+def build_package() -> None:
+    """Builds the package that the service's tests install, on this side, as a guest has no network.
+
+    Raises:
+        MissingTool: it can't be built here.
+    """
+    print("building the Debian package, if it is not there", flush=True)
+    if subprocess.run(["make", "--silent", "deb"]).returncode:
+        raise MissingTool("the package for the tests of the service can't be built: see what `make deb` says")
 
 
 def run_here(mark: str, timeout_s: float, pytest_options: list[str]) -> Part:
