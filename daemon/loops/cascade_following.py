@@ -91,8 +91,11 @@ class CascadeFollower(SectionFollower):
             bending_rad: measured; without meaning for a truck alone.
             steering_rad: the steering angle now.
             speed_m_s: of the truck's rear axle; its sign does not matter.
+
+        Raises:
+            ValueError: a number is not finite.
         """
-        meeting = self._meet(pose)
+        meeting = self._meet(pose, bending_rad)
         piece = self._path.pieces[meeting.piece]
         errors = errors_on(piece, meeting, pose, bending_rad, self._hitch)
         lead_m = abs(speed_m_s) * self._tuning.lead_s

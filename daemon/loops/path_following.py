@@ -174,7 +174,9 @@ class SectionFollower:
         self._meeting = Meeting(self._path.sections[self.section][0], 0.0, 0.0)
         return True
 
-    def _meet(self, pose: Pose) -> Meeting:
+    def _meet(self, pose: Pose, bending_rad: float) -> Meeting:
+        if not math.isfinite(pose.x_m + pose.y_m + pose.yaw_rad + bending_rad):
+            raise ValueError(f"no steering for a pose {pose} and a bending angle of {bending_rad} rad")
         self._meeting = self._path.meet(self.section, self._meeting, pose.x_m, pose.y_m)
         return self._meeting
 
@@ -233,8 +235,11 @@ class PathFollower(SectionFollower):
         Args:
             pose: of the reference unit: driving forwards the truck's, backwards the trailer's.
             bending_rad: measured; without meaning for a truck alone.
+
+        Raises:
+            ValueError: a number is not finite.
         """
-        meeting = self._meet(pose)
+        meeting = self._meet(pose, bending_rad)
         piece = self._path.pieces[meeting.piece]
         target = self._target(piece, meeting)
         curvature = published_circle_curvature(pose, target) if self._published else circle_curvature(pose, target)

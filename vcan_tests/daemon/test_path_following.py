@@ -165,3 +165,10 @@ def test_trailers_that_cannot_be_reversed_are_refused(hitches: tuple[Hitch, ...]
 
 def test_the_printed_curvature_is_that_of_the_mirrored_circle() -> None:
     assert published_circle_curvature(Pose(0, 0, 0), (1, 1)) == -circle_curvature(Pose(0, 0, 0), (1, 1)) == -1.0
+
+
+@pytest.mark.parametrize(("x", "bending"), [(math.nan, 0.0), (math.inf, 0.0), (0.0, math.nan)])
+def test_a_lost_pose_or_bending_angle_is_not_steered_by(x: float, bending: float) -> None:
+    law = PathFollower(SEMITRAILER, Path([LINE_BACKWARDS]), TUNING)
+    with pytest.raises(ValueError, match="no steering"):
+        law.step(Pose(x, 0.0, 0.0), bending)
