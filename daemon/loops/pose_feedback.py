@@ -36,7 +36,7 @@ class PoseGains:
 
 
 REPORT_GAINS: Final = PoseGains(3.0, 8.0, -1.5)
-"""Those of the NXT report's calls, for a cycle of 0.3 s at most."""
+"""Those of the NXT report's calls, for a cycle of 0.2 s at most."""
 SLOW_CYCLE_GAINS: Final = PoseGains(1.0, 2.5, -0.5)
 """For cycles of up to 0.3 s with as much delay again: what Bluetooth allows."""
 
@@ -85,6 +85,8 @@ class Phase(StrEnum):
     DRIVING = "driving"
     TURNING = "turning"
     """In position; only the heading is missing."""
+    SETTLING = "settling"
+    """There, and stopped to see whether it stays so: what is known of a pose is always a little old."""
     REACHED = "reached"
     TIMED_OUT = "timed_out"
 
@@ -153,14 +155,17 @@ class GoalSeeker:
         else:
             self._elapsed_s += dt_s
         self._update_phase(pose)
-        if self.done:
-            return 0.0, 0.0
-        forward, yaw_rate = self._turn(pose) if self.phase is Phase.TURNING else self._law(*self._way(pose))
+        forward, yaw_rate = self._motion(pose)
         wheels = self._drive.wheel_speeds(forward, yaw_rate)
         return limit_speeds(*wheels, self._settings.wheel_limit_rad_s)
 
-    def _way(self, pose: Pose) -> tuple[Pose, Pose, PoseGains]:
-        return pose, self._goal, self._settings.gains
+    def _motion(self, pose: Pose) -> tuple[float, float]:
+        gains, goal = self._settings.gains, self._goal
+        if self.phase is Phase.DRIVING:
+            return self._law(pose, goal, gains)
+        if self.phase is Phase.TURNING:
+            return 0.0, gains.alpha * wrap_angle(goal.yaw_rad - pose.yaw_rad)
+        return 0.0, 0.0
 
     def _choose_direction(self, pose: Pose) -> None:
         """Backward where the goal lies behind; once chosen it stays, or the robot would dither at a right angle."""
@@ -174,16 +179,13 @@ class GoalSeeker:
         if self.done:
             return
         if at_goal(pose, self._goal, settings.tolerance):
-            self.phase = Phase.REACHED
+            self.phase = Phase.REACHED if self.phase is Phase.SETTLING else Phase.SETTLING
         elif self._elapsed_s >= settings.timeout_s:
             self.phase = Phase.TIMED_OUT
         elif settings.turn_in_place and in_position(pose, self._goal, settings.tolerance):
             self.phase = Phase.TURNING
         else:
             self.phase = Phase.DRIVING
-
-    def _turn(self, pose: Pose) -> tuple[float, float]:
-        return 0.0, self._settings.gains.alpha * wrap_angle(self._goal.yaw_rad - pose.yaw_rad)
 
 
 class GearPlay:
@@ -204,3 +206,26 @@ class GearPlay:
         """Where the wheel stands now that the motor stands at ``motor_rad``."""
         self.wheel_rad = max(motor_rad - self._half, min(motor_rad + self._half, self.wheel_rad))
         return self.wheel_rad
+
+
+class AlignedTurns:
+    """Wheels that are read one after the other, at one time: that of the first reading.
+
+    Where they turn alike, the time between both readings would look like a turn of the robot.
+    """
+
+    def __init__(self) -> None:
+        self._last: tuple[float, float] | None = None
+
+    def align(self, first: tuple[float, float], second: tuple[float, float]) -> tuple[float, float]:
+        """Angles [rad] of both wheels when the first one was read.
+
+        Args:
+            first: angle [rad] of the wheel that is read first, and when [s].
+            second: the same of the other one, which is interpolated between its last reading and this one.
+        """
+        last, self._last = self._last, second
+        if last is None or second[1] <= last[1]:
+            return first[0], second[0]
+        share = (first[1] - last[1]) / (second[1] - last[1])
+        return first[0], last[0] + (second[0] - last[0]) * max(0.0, min(1.0, share))

@@ -123,12 +123,15 @@ class Status:
 
 
 OK: Final = 0x00
-PENDING: Final = 0x20
 MAILBOX_EMPTY: Final = 0x40
+REQUEST_FAILED: Final = 0xBD
 UNKNOWN_OPCODE: Final = 0xBE
 INSANE_PACKET: Final = 0xBF
 OUT_OF_RANGE: Final = 0xC0
+SENSOR_BUS_ERROR: Final = 0xDD
+NOT_CONFIGURED: Final = 0xE0
 NO_PROGRAM: Final = 0xEC
+ILLEGAL_MAILBOX: Final = 0xEE
 
 _FILES = "close other files, or switch the brick off and on"
 _SPACE = "delete files on the brick"
