@@ -28,8 +28,8 @@ def broken(tmp_path: Path) -> Path:
     return path
 
 
-def test_list_shows_the_shipped_robot(capsys: Captured) -> None:
-    assert [row["name"] for row in rows(capsys, "list")] == ["max2d"]
+def test_list_shows_the_shipped_robots(capsys: Captured) -> None:
+    assert [row["name"] for row in rows(capsys, "list")] == ["max2d", "turtle"]
 
 
 def test_show_gives_what_the_robots_own_file_says(capsys: Captured) -> None:

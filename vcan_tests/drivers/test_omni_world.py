@@ -93,7 +93,7 @@ def test_the_body_moves_as_the_loops_kinematics_say_of_its_rims(
     world.advance(1.5)
     rims = [wheel.drive.rim_m_s for wheel in world.wheels.values()]
     assert kinematics(profile).body_motion(rims) == pytest.approx(world.velocity, abs=0.015)
-    assert world.velocity == pytest.approx(motion, abs=0.05)
+    assert world.velocity == pytest.approx(motion, abs=0.1)
 
 
 def test_rollers_let_a_wheel_be_pushed_across() -> None:
