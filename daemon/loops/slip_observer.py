@@ -22,7 +22,7 @@ Motion = tuple[float, float, float]
 """Forward, to the left, counter-clockwise: speeds [m/s, rad/s] or accelerations [m/s2, rad/s2]."""
 
 BREAKAWAY_M_S: Final = 0.01
-"""Rim speed at which dry friction is all there."""
+"""Rim speed from which dry friction is all there; of a standing wheel it takes what it can of the motor's force."""
 SWEEPS: Final = 4
 """Times that the impulses of all rows are computed a cycle; what is left, the next cycle takes."""
 
@@ -45,10 +45,13 @@ class RimDrive:
 
     def floor_force(self, current_a: float, speed_m_s: float, acceleration_m_s2: float) -> float:
         """Force of the floor on the wheel along its direction [N], forward where it drives the robot forward."""
-        force = self.force_per_a * current_a
-        force *= self.efficiency if force * speed_m_s >= 0 else 1 / self.efficiency
-        friction = self.friction_n * max(-1.0, min(1.0, speed_m_s / BREAKAWAY_M_S))
-        return force - friction - self.mass_kg * acceleration_m_s2
+        motor = self.force_per_a * current_a
+        part = min(1.0, abs(speed_m_s) / BREAKAWAY_M_S)
+        moving = motor * (self.efficiency if motor * speed_m_s >= 0 else 1 / self.efficiency)
+        moving -= math.copysign(self.friction_n, speed_m_s)
+        standing = motor * self.efficiency
+        standing -= max(-self.friction_n, min(self.friction_n, standing))
+        return part * moving + (1 - part) * standing - self.mass_kg * acceleration_m_s2
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,9 +83,9 @@ class ObserverTuning:
     """
 
     smoothing_s: float = 0.015
-    trust_s: float = 0.8
+    trust_s: float = 0.7
     distrust_s: float = 3.0
-    slip_m_s: float = 0.05
+    slip_m_s: float = 0.06
     slip_ratio: float = 0.06
     grip_part: float = 0.6
 

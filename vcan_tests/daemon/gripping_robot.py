@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import Protocol
 
 from daemon.loops.accelerometer import Accelerometer, Mounting, Vector, rotated
 from daemon.loops.omni import OmniKinematics, turtle_wheels
@@ -13,17 +14,29 @@ from daemon.loops.published_planner_axis import AxisCase
 from daemon.loops.published_traction import SafetyFactor as PublishedFactor
 from daemon.loops.slip import AxisSlipDetector
 from daemon.loops.slip_observer import Body, Observed, RimDrive, SlipObserver
-from daemon.loops.traction import Traction, TractionRecord, TractionTuning, limited_lead
+from daemon.loops.traction import Traction, TractionRecord, limited_lead
 from vcan_tests.daemon import omni_floor
-from vcan_tests.daemon.omni_floor import CYCLE_S, OmniFloor
+from vcan_tests.daemon.omni_floor import CYCLE_S
 
-LIMITS = PlanarLimits(1.5, 1.5, 3.0, 6.0)
 KINEMATICS = OmniKinematics(turtle_wheels(0.2, 0.2, 0.2))
 PLACE, ROTATION = omni_floor.SENSOR
 DRIVE = RimDrive(omni_floor.FORCE_PER_A, omni_floor.RIM_MASS_KG, omni_floor.FRICTION_N, omni_floor.EFFICIENCY)
 BODY = Body(omni_floor.MASS_KG, omni_floor.YAW_INERTIA)
 TOLERANCE = Tolerance(0.05, 0.1, 0.1, 0.5)
 LONGEST_S = 12.0
+
+
+@dataclass(frozen=True)
+class RobotData:
+    """What the loops know of a robot."""
+
+    limits: PlanarLimits
+    drive: RimDrive
+    body: Body
+    mounting: Mounting
+
+
+FLOOR_ROBOT = RobotData(PlanarLimits(1.5, 1.5, 3.0, 6.0), DRIVE, BODY, Mounting(PLACE.real, PLACE.imag, ROTATION))
 SLIPS_M_S = 0.06
 """True slip speed of a wheel that counts as slip."""
 TOGETHER_S = 0.1
@@ -98,6 +111,20 @@ def near(a: tuple[int, int], b: tuple[int, int]) -> bool:
     return a[0] <= b[1] + reach and b[0] <= a[1] + reach
 
 
+class Floor(Protocol):
+    """A robot in its room: :class:`OmniFloor`, or the twin in :mod:`vcan_tests.daemon.omni_twin`."""
+
+    reading: Vector
+    rims: list[float]
+    currents: list[float]
+    slips: list[float]
+    place: complex
+    velocity: complex
+    heading: float
+
+    def roll(self, rim_targets: tuple[float, ...]) -> None: ...
+
+
 class Answer:
     """No answer to slip at all."""
 
@@ -129,8 +156,8 @@ class PublishedAnswer(Answer):
 class ImprovedAnswer(Answer):
     """As it should be."""
 
-    def __init__(self, tuning: TractionTuning | None = None) -> None:
-        self._traction = Traction(LIMITS.acceleration, tuning)
+    def __init__(self, acceleration_m_s2: float = FLOOR_ROBOT.limits.acceleration) -> None:
+        self._traction = Traction(acceleration_m_s2)
 
     def step(self, measured: Vector, commanded: Vector, cruising: bool, overshoot: bool, slipping: bool) -> None:
         self.record = self._traction.step(measured, commanded, CYCLE_S, cruising, overshoot, slipping=slipping)
@@ -150,21 +177,25 @@ class Daemon:
         goal: where to.
         answer: to slip. Without one (:class:`Answer` itself) the wheels are believed, else the observer is.
         by_currents: there is no accelerometer.
+        robot: its data.
     """
 
-    def __init__(self, start: PlanarState, goal: PlanarState, answer: Answer, by_currents: bool) -> None:
+    def __init__(
+        self, start: PlanarState, goal: PlanarState, answer: Answer, by_currents: bool, robot: RobotData
+    ) -> None:
         self._goal = goal
+        self._all = robot.limits
         self._answer = answer
-        self._sensor = None if by_currents else Accelerometer(Mounting(PLACE.real, PLACE.imag, ROTATION))
-        self._observer = SlipObserver(BODY, [DRIVE] * 3, KINEMATICS.forward)
+        self._sensor = None if by_currents else Accelerometer(robot.mounting)
+        self._observer = SlipObserver(robot.body, [robot.drive] * 3, KINEMATICS.forward)
         self._believes_wheels = type(answer) is Answer
         self._pose = self.target = start
         self._yaw_rate = 0.0
         self._commanded: Vector = (0.0, 0.0)
-        self.plan = plan_motion(start, goal, LIMITS)
+        self.plan = plan_motion(start, goal, robot.limits)
         self.observed: Observed | None = None
 
-    def step(self, floor: OmniFloor, now: float) -> tuple[float, ...]:
+    def step(self, floor: Floor, now: float) -> tuple[float, ...]:
         """Rim speeds to command."""
         measured = None
         if self._sensor is not None:
@@ -175,7 +206,7 @@ class Daemon:
         acceleration = rotated((seen.acceleration[0], seen.acceleration[1]), self._pose.heading)
         cruising = self.plan.way.case(now - self.plan.began) == "cruise"
         factor = self._answer.factor
-        overshoot = _passes(self._pose, self._goal, factor * LIMITS.acceleration)
+        overshoot = _passes(self._pose, self._goal, factor * self._all.acceleration)
         self._answer.step(acceleration, self._commanded, cruising, overshoot, any(seen.slipping))
         start = self._start(any(seen.slipping) and not self._believes_wheels)
         if self._answer.factor != factor:
@@ -187,8 +218,8 @@ class Daemon:
 
     def _limits(self) -> PlanarLimits:
         factor = self._answer.factor
-        turn = max(0.3, factor) * LIMITS.angular_acceleration
-        return replace(LIMITS, acceleration=factor * LIMITS.acceleration, angular_acceleration=turn)
+        turn = max(0.3, factor) * self._all.angular_acceleration
+        return replace(self._all, acceleration=factor * self._all.acceleration, angular_acceleration=turn)
 
     def _move(self, motion: tuple[float, float, float]) -> None:
         """Odometry."""
@@ -205,7 +236,7 @@ class Daemon:
         pose, target = self._pose, self.target
         vx, vy, rate = target.vx, target.vy, target.rate
         if slipping:
-            lead = SLIP_M_S + LAG_S * LIMITS.acceleration * self._answer.factor
+            lead = SLIP_M_S + LAG_S * self._all.acceleration * self._answer.factor
             vx, vy = limited_lead((vx, vy), (pose.vx, pose.vy), lead)
             rate = pose.rate + max(-lead / 0.2, min(lead / 0.2, rate - pose.rate))
         return PlanarState(
@@ -218,10 +249,12 @@ class Daemon:
         )
 
 
-def drive(floor: OmniFloor, goal: PlanarState, answer: Answer, *, by_currents: bool = False) -> Drive:
+def drive(
+    floor: Floor, goal: PlanarState, answer: Answer, *, by_currents: bool = False, robot: RobotData = FLOOR_ROBOT
+) -> Drive:
     """Drive to a goal."""
     driven = Drive()
-    daemon = Daemon(PlanarState(vx=floor.velocity.real, vy=floor.velocity.imag), goal, answer, by_currents)
+    daemon = Daemon(PlanarState(vx=floor.velocity.real, vy=floor.velocity.imag), goal, answer, by_currents, robot)
     for number in range(round(LONGEST_S / CYCLE_S)):
         now = number * CYCLE_S
         slip = max(map(abs, floor.slips))

@@ -132,3 +132,8 @@ def test_a_wrong_belief_in_fast_floor_makes_no_wheel_faster() -> None:
 
 def test_without_knowledge_of_the_floor_a_wheel_is_left_alone() -> None:
     assert WheelGrip(1).step((1.0,), (math.nan,), (True,), CYCLE_S).wheel_speeds_m_s == (1.0,)
+
+
+def test_at_rest_dry_friction_holds_against_the_motor() -> None:
+    assert DRIVE.floor_force(0.2, 0.0, 0.0) == 0.0
+    assert DRIVE.floor_force(-0.2, 0.0, 0.0) == 0.0

@@ -1,0 +1,104 @@
+"""Traction control on a floor with ice: way aside, time lost, the safety factor's unrest, slip found against the truth.
+
+    .venv/bin/python -m benchmarks.traction [SEEDS]
+
+Each scenario is driven without traction control, with the published one, and with the improved one by accelerometer and
+by motor currents alone; first on the small plant of the tests, then on the simulated Turtle.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Callable
+from statistics import mean
+
+from daemon.loops.planner import PlanarState
+from daemon.loops.traction import Traction
+from profiles.schema import FloorPatch
+from vcan_tests.daemon.gripping_robot import FLOOR_ROBOT, Answer, Drive, Floor, ImprovedAnswer, PublishedAnswer, drive
+from vcan_tests.daemon.omni_floor import ICE, OmniFloor, dry, ice_between
+from vcan_tests.daemon.omni_twin import TwinFloor, robot_data, turtle
+
+GOAL = PlanarState(3.0, 0.0)
+HEAD = f"{'':34}{'arrives':>8}{'lost':>7}{'aside':>8}{'end off':>9}{'changes':>9}{'turns':>7}{'found/missed/false':>20}"
+
+Scenarios = dict[str, tuple[Callable[[int], Floor], Callable[[int], Floor]]]
+
+
+def patch(x_from: float, x_to: float, y_from: float = -9.0, y_to: float = 9.0) -> FloorPatch:
+    middle = (x_from + x_to) / 2, (y_from + y_to) / 2
+    return FloorPatch(x_m=middle[0], y_m=middle[1], length_m=x_to - x_from, width_m=y_to - y_from, friction=ICE)
+
+
+PATCHES = {
+    "dry": None,
+    "ice while speeding up": (0.3, 1.0, -9.0, 9.0),
+    "ice under the left wheels": (0.2, 1.5, 0.05, 9.0),
+    "ice while braking": (1.8, 2.6, -9.0, 9.0),
+}
+
+
+def report(name: str, drives: list[Drive], undisturbed_s: float) -> None:
+    """One line: means over the seeds, sums of the events."""
+    arrived = mean(driven.arrived_s for driven in drives)
+    aside = mean(driven.aside(1 + 0j) for driven in drives)
+    off = mean(abs(driven.cycles[-1].place - 3) for driven in drives)
+    changes = mean(driven.factor_changes() for driven in drives)
+    turns = mean(driven.turned_round() for driven in drives)
+    events = "/".join(str(sum(column)) for column in zip(*(driven.events() for driven in drives), strict=True))
+    lost = arrived - undisturbed_s
+    print(f"{name:34}{arrived:7.2f}s{lost:6.2f}s{aside:7.3f}m{off:8.3f}m{changes:9.1f}{turns:7.1f}{events:>20}")
+
+
+def compare(title: str, make: Callable[[str, int], Floor], twin: bool, seeds: range) -> None:
+    """All scenarios on one plant."""
+    robot = robot_data(turtle()) if twin else FLOOR_ROBOT
+    undisturbed_s = drive(make("dry", 1), GOAL, Answer(), robot=robot).arrived_s
+    print(f"\n{title}; means over {len(seeds)} seeds\n{HEAD}")
+    for scenario in PATCHES:
+        ways: list[tuple[str, Callable[[], Answer], bool]] = [
+            ("off", Answer, False),
+            ("published", PublishedAnswer, False),
+            ("improved, accelerometer", lambda: ImprovedAnswer(robot.limits.acceleration), False),
+            ("improved, currents", lambda: ImprovedAnswer(robot.limits.acceleration), True),
+        ]
+        print(scenario)
+        for way, answer, by_currents in ways:
+            drives = [
+                drive(make(scenario, seed), GOAL, answer(), by_currents=by_currents, robot=robot) for seed in seeds
+            ]
+            report(f"  {way}", drives, undisturbed_s)
+
+
+def small_plant(scenario: str, seed: int) -> Floor:
+    bounds = PATCHES[scenario]
+    return OmniFloor(ice_between(*bounds) if bounds else dry, seed)
+
+
+def simulated_turtle(scenario: str, seed: int) -> Floor:
+    bounds = PATCHES[scenario]
+    return TwinFloor(turtle(ice=patch(*bounds)) if bounds else turtle(), seed)
+
+
+def cost_us() -> float:
+    """Median duration of one step of slip detection and safety factor."""
+    traction, durations = Traction(1.5), []
+    for number in range(20000):
+        begin = time.perf_counter()
+        traction.step((math.sin(number / 50), 0.1), (1.0, 0.0), 0.01)
+        durations.append(time.perf_counter() - begin)
+    return sorted(durations)[len(durations) // 2] * 1e6
+
+
+def main() -> None:
+    seeds = range(1, 1 + (int(sys.argv[1]) if len(sys.argv) > 1 else 3))
+    print(f"seeds {seeds.start} to {seeds.stop - 1}; ice has a friction of {ICE}")
+    compare("small plant, accelerometer noise 0.1 m/s2", small_plant, False, seeds)
+    compare("simulated Turtle", simulated_turtle, True, seeds)
+    print(f"\none step of traction control: {cost_us():.1f} us at the median")
+
+
+if __name__ == "__main__":
+    main()
