@@ -32,7 +32,8 @@ def pytest_asyncio_loop_factories(item: pytest.Item) -> Mapping[str, Callable[[]
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Tests in real time get a second and a third try: a loaded machine may stand still for longer than they allow."""
     for item in items:
-        if item.get_closest_marker("real_time") or "bench" in getattr(item, "fixturenames", ()):
+        real = any(item.get_closest_marker(mark) for mark in ("real_time", *NEEDS))
+        if real or "bench" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.flaky(reruns=2))
 
 
