@@ -61,8 +61,8 @@ def compare(title: str, make: Callable[[str, int], Floor], twin: bool, seeds: ra
         ways: list[tuple[str, Callable[[], Answer], bool]] = [
             ("off", Answer, False),
             ("published", PublishedAnswer, False),
-            ("improved, accelerometer", lambda: ImprovedAnswer(robot.limits.acceleration), False),
-            ("improved, currents", lambda: ImprovedAnswer(robot.limits.acceleration), True),
+            ("improved, accelerometer", lambda: ImprovedAnswer(robot), False),
+            ("improved, currents", lambda: ImprovedAnswer(robot), True),
         ]
         print(scenario)
         for way, answer, by_currents in ways:

@@ -14,7 +14,7 @@ from daemon.loops.published_planner_axis import AxisCase
 from daemon.loops.published_traction import SafetyFactor as PublishedFactor
 from daemon.loops.slip import AxisSlipDetector
 from daemon.loops.slip_observer import Body, Observed, RimDrive, SlipObserver
-from daemon.loops.traction import Traction, TractionRecord, limited_lead
+from daemon.loops.traction import Traction, TractionRecord, TractionTuning, limited_lead
 from vcan_tests.daemon import omni_floor
 from vcan_tests.daemon.omni_floor import CYCLE_S
 
@@ -34,6 +34,7 @@ class RobotData:
     drive: RimDrive
     body: Body
     mounting: Mounting
+    tuning: TractionTuning = field(default_factory=TractionTuning)
 
 
 FLOOR_ROBOT = RobotData(PlanarLimits(1.5, 1.5, 3.0, 6.0), DRIVE, BODY, Mounting(PLACE.real, PLACE.imag, ROTATION))
@@ -156,8 +157,8 @@ class PublishedAnswer(Answer):
 class ImprovedAnswer(Answer):
     """As it should be."""
 
-    def __init__(self, acceleration_m_s2: float = FLOOR_ROBOT.limits.acceleration) -> None:
-        self._traction = Traction(acceleration_m_s2)
+    def __init__(self, robot: RobotData = FLOOR_ROBOT) -> None:
+        self._traction = Traction(robot.limits.acceleration, robot.tuning)
 
     def step(self, measured: Vector, commanded: Vector, cruising: bool, overshoot: bool, slipping: bool) -> None:
         self.record = self._traction.step(measured, commanded, CYCLE_S, cruising, overshoot, slipping=slipping)

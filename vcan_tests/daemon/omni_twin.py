@@ -10,6 +10,7 @@ from daemon.loops.accelerometer import Mounting, Vector
 from daemon.loops.paired_traction import rim_drive
 from daemon.loops.planner import PlanarLimits
 from daemon.loops.slip_observer import Body
+from daemon.loops.traction import TractionTuning
 from drivers.simulated.omni import OmniWorld
 from profiles.loader import load
 from profiles.schema import DriveConfig, FloorPatch, OmniGeometry, Profile
@@ -44,6 +45,7 @@ def robot_data(profile: Profile) -> RobotData:
         rim_drive(drive, simulation.wheel_inertia_kg_m2, rolling_n),
         Body(vehicle.mass_kg, vehicle.yaw_inertia_kg_m2),
         Mounting(sensor.x_m, sensor.y_m, math.radians(sensor.rotation_deg)),
+        TractionTuning(response_s=0.04),
     )
 
 
