@@ -43,16 +43,16 @@ class CascadeTuning:
         lead_s: time by which errors are taken ahead.
     """
 
-    position_gain: float = 7.05
-    approach_curvature: float = 0.669
-    max_approach_rad: float = 0.309
-    sharpness: float = 9.5
-    heading_gain: float = 3.36
-    max_curvature: float = 3.6
-    max_bending_rad: float = 1.1
-    bending_gain: float = 14.0
-    rate_share: float = 0.73
-    lead_s: float = 0.217
+    position_gain: float = 6.83
+    approach_curvature: float = 0.635
+    max_approach_rad: float = 0.303
+    sharpness: float = 11.3
+    heading_gain: float = 3.21
+    max_curvature: float = 5.0
+    max_bending_rad: float = 1.2
+    bending_gain: float = 13.4
+    rate_share: float = 0.7
+    lead_s: float = 0.22
 
 
 class _Errors(NamedTuple):
