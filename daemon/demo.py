@@ -13,14 +13,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from canhelm.errors import Timeout, UsageError
+from canhelm.errors import UsageError
 from daemon.app import App
+from daemon.demo_robot import DemoRobot
 from daemon.loops.geometry import solve_turning
 from daemon.loops.odometry import least_squares
-from daemon.runtime.vehicle import VehicleState
 from profiles.schema import PairedSteerGeometry, Profile
-
-BOOT_DEADLINE_S = 20.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +97,7 @@ class FigureResult:
     icr_m: tuple[float, float] | None
 
 
-class Demo:
+class Demo(DemoRobot):
     """Boots one simulated robot and drives figures with it.
 
     Args:
@@ -122,18 +120,15 @@ class Demo:
     ) -> None:
         if not isinstance(profile.vehicle, PairedSteerGeometry):
             raise UsageError(f"profile {profile.name} has no paired steering", remedy="the demo drives max2d")
-        self.app = app = App(profile, bus, seed=seed, record=record)
-        if watch is not None:
-            app.supervisor.observers.append(lambda: watch(app))
+        super().__init__(profile, seed, record, tell, watch, bus)
         self._geometry = profile.vehicle
-        self._limits = app.profile.limits
-        self._tell = tell
+        self._limits = self.app.profile.limits
 
     async def run(self, figures: tuple[Figure, ...]) -> list[FigureResult]:
         """Boot, drive the figures one after another, go down. Raises CanhelmError leaves where the robot fails."""
         await self.app.start()
         try:
-            await self._boot()
+            await self.boot("four drives and two encoders")
             return [await self._drive(self._permitted(figure)) for figure in figures]
         finally:
             await self.app.close()
@@ -147,34 +142,14 @@ class Demo:
             return figure
         speed = math.copysign(math.floor(100 * top) / 100, figure.speed_m_s)
         duration = figure.speed_m_s * figure.duration_s / speed
-        self._tell(f"figure {figure.identity} at {abs(speed):g} m/s: the cycle over this wire permits no more")
+        self.tell(f"figure {figure.identity} at {abs(speed):g} m/s: the cycle over this wire permits no more")
         return replace(figure, speed_m_s=speed, duration_s=duration)
 
-    async def _boot(self) -> None:
-        self._tell("booting: four drives and two encoders on a simulated CANopen bus")
-        loop = asyncio.get_running_loop()
-        begin_s, ready = loop.time(), loop.create_future()
-
-        def look() -> None:
-            if self.app.supervisor.state is VehicleState.IDLE and not ready.done():
-                ready.set_result(None)
-
-        self.app.supervisor.observers.append(look)
-        try:
-            await asyncio.wait_for(ready, BOOT_DEADLINE_S)
-        except TimeoutError:
-            raise Timeout(f"the simulated robot did not boot: {self.app.supervisor.message}") from None
-        finally:
-            self.app.supervisor.observers.remove(look)
-        self._tell(f"ready after {loop.time() - begin_s:.2f} s")
-
     async def _drive(self, figure: Figure) -> FigureResult:
-        app = self.app
-        assert app.network is not None
-        world = app.network.world
+        app, world = self.app, self.world
         loop = asyncio.get_running_loop()
         begin_s, track = loop.time(), Track()
-        before = self._counts()
+        before = self.counts()
         world.advance(begin_s)
         origin = world.pose
         observer = self._observer(track, begin_s, origin)
@@ -182,14 +157,14 @@ class Demo:
         method, parameters = figure.request()
         lease = app.service.open_lease("demo")
         renewing = loop.create_task(self._renew(lease))
-        self._tell(f"figure {figure.identity}: {figure.words}")
+        self.tell(f"figure {figure.identity}: {figure.words}")
         try:
             result = await app.service.call(method, parameters, lease)
         finally:
             app.supervisor.observers.remove(observer)
             renewing.cancel()
             app.service.close_lease(lease, "the demo is over")
-        frames, cycles, late, busy_s = (now - then for now, then in zip(self._counts(), before, strict=True))
+        frames, cycles, late, busy_s = (now - then for now, then in zip(self.counts(), before, strict=True))
         duration_s = loop.time() - begin_s
         numbers: dict[str, Any] = {
             "figure": figure.identity,
@@ -205,13 +180,8 @@ class Demo:
         line = app.bus.details()
         if line:
             numbers["line"] = {"cycle_hz": round(cycles / duration_s, 2), **line}
-            self._tell(_line_words(numbers["line"]))
+            self.tell(_line_words(numbers["line"]))
         return FigureResult(figure, numbers, track, self._centre_of_rotation(figure))
-
-    def _counts(self) -> tuple[int, int, int, float]:
-        medium, counters = self.app.medium, self.app.cycle.counters
-        assert medium is not None
-        return sum(medium.frames.values()), counters.cycles, counters.late_cycles, medium.busy_s
 
     async def _renew(self, lease: str) -> None:
         while True:
@@ -219,9 +189,7 @@ class Demo:
             self.app.service.renew_lease(lease)
 
     def _observer(self, track: Track, begin_s: float, origin: tuple[float, float, float]) -> Callable[[], None]:
-        app = self.app
-        assert app.network is not None
-        world, supervisor, loop = app.network.world, app.supervisor, asyncio.get_running_loop()
+        world, supervisor, loop = self.world, self.app.supervisor, asyncio.get_running_loop()
 
         def look() -> None:
             measurement = supervisor.measurement

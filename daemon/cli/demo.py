@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import signal
+from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from daemon.demo import FigureResult
+    from daemon.demo_turtle import TurtleFigure, TurtleResult
+    from profiles.schema import Profile
 
 
 def demo(
@@ -25,31 +28,36 @@ def demo(
     virtual_time: Annotated[bool, Parameter(negative=())] = False,
     seed: int = 0,
     out: Path | None = None,
-    profile: str = "max2d",
+    profile: str | None = None,
     bus: str = "simulated",
     json: Json = None,
 ) -> int:
-    """Boot a simulated MAX2D and drive the manoeuvres that its designers published.
+    """Boot a simulated robot and drive the manoeuvres that its designers published: the MAX2D's, or the Turtle's.
 
     Example: `canhelm demo --virtual-time --out demo-out`
 
     Args:
-        figure: One figure (4.6, 4.7, 4.15 or 4.16); all of them without it.
+        figure: One figure of the MAX2D (4.6, 4.7, 4.15 or 4.16), all of them without it; one of the Turtle (7.3, 7.4,
+            7.6, 7.7, ice-off, ice-on), or `turtle` for all of those.
         virtual_time: As fast as the processor goes instead of in real time; the same run every time.
         seed: Seed of everything random in the simulated network.
         out: Folder for pictures and the candump log.
-        profile: A robot with paired steering and simulation data.
+        profile: A robot like the figure's with simulation data; `max2d` or `turtle` without it.
         bus: `simulated`, or `rs232` (`rs232@38400`): the same robot behind the serial line of one of its drives.
     """
+    from daemon import demo_turtle
     from daemon.demo import FIGURES, Demo
     from daemon.runtime.clock import run_precise, run_virtual
     from profiles.loader import load
 
     figures = tuple(entry for entry in FIGURES if figure in (None, entry.identity))
-    if not figures:
-        have = ", ".join(entry.identity for entry in FIGURES)
-        raise UsageError(f"no figure {figure!r}", remedy=f"one of {have}")
-    robot = load(profile).profile
+    turtle = tuple(entry for entry in demo_turtle.FIGURES if figure in (demo_turtle.GROUP, entry.identity))
+    if not figures and not turtle:
+        have = ", ".join(entry.identity for entry in (*FIGURES, *demo_turtle.FIGURES))
+        raise UsageError(f"no figure {figure!r}", remedy=f"one of {have}, {demo_turtle.GROUP}")
+    robot = load(profile or ("turtle" if turtle else "max2d")).profile
+    if turtle and bus != "simulated":
+        raise UsageError("the accelerometer needs CAN", value=bus, remedy="leave --bus out")
     if bus.partition("@")[0] not in ("simulated", "rs232"):
         raise UsageError(
             f"the demo simulates its network, on {bus!r} it cannot", remedy="--bus simulated or --bus rs232"
@@ -57,16 +65,56 @@ def demo(
     if out is not None:
         _make_folder(out)
     _end_by_signals()
+    runner = run_virtual if virtual_time else run_precise
+    if turtle:
+        return _turtle(turtle, robot, seed, out, json, runner)
     with DemoView(every=100 if virtual_time else 10) as view:
 
         async def drive() -> list[FigureResult]:
             return await Demo(robot, seed, out, view.tell, view.watch, bus).run(figures)
 
-        results = run_virtual(drive()) if virtual_time else run_precise(drive())
+        results = runner(drive())
     show([result.numbers for result in results], lambda _: _table(results), json)
     if out is not None:
         _draw(results, robot.vehicle, out)
     return 0
+
+
+def _turtle(
+    figures: tuple[TurtleFigure, ...],
+    robot: Profile,
+    seed: int,
+    out: Path | None,
+    json: bool | None,
+    runner: Callable[[Coroutine[Any, Any, list[TurtleResult]]], list[TurtleResult]],
+) -> int:
+    from daemon import demo_turtle
+
+    async def drive() -> list[TurtleResult]:
+        return [await demo_turtle.drive(robot, figure, seed, out, say) for figure in figures]
+
+    results = runner(drive())
+    show([result.numbers for result in results], lambda _: _turtle_table(results), json)
+    if out is not None and _can_draw():
+        from daemon.demo_turtle_pictures import draw
+
+        for result in results:
+            say(f"picture {draw(result, out)}")
+    return 0
+
+
+def _turtle_table(results: list[TurtleResult]) -> Table:
+    from rich.table import Table
+
+    table = Table("figure", "move", "quantity", "published", "commanded", "achieved", title="Turtle, simulated")
+    for result in results:
+        published, commanded, achieved = (result.numbers[part] for part in ("published", "commanded", "achieved"))
+        for key, value in achieved.items():
+            cells = [published.get(key), commanded.get(key), value]
+            shown = ["-" if cell is None else f"{cell:g}" for cell in cells]
+            table.add_row(result.figure.identity, result.figure.words, key, *shown)
+        table.add_section()
+    return table
 
 
 def _end_by_signals() -> None:
@@ -111,9 +159,15 @@ def _table(results: list[FigureResult]) -> Table:
     return table
 
 
-def _draw(results: list[FigureResult], geometry: Any, out: Path) -> None:
+def _can_draw() -> bool:
     if importlib.util.find_spec("matplotlib") is None:
         say("no pictures: matplotlib is missing - pip install 'canhelm[plot]'")
+        return False
+    return True
+
+
+def _draw(results: list[FigureResult], geometry: Any, out: Path) -> None:
+    if not _can_draw():
         return
     from daemon.demo_pictures import draw
 
