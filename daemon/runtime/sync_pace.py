@@ -25,6 +25,8 @@ AHEAD_S = 0.25
 """How long SYNC goes on without a cycle: a longer pause than a loaded machine makes, less than a node's life time."""
 PATIENCE = 2.5
 """Periods without a SYNC after which the timer ticks."""
+WORTH_TELLING_S = 1.0
+"""How long the kernel's SYNC stays away before somebody has to know: a pause of this process alone ends sooner."""
 
 
 class SyncPace:
@@ -51,6 +53,8 @@ class SyncPace:
         self._frame = RepeatedFrame(bus.name, SYNC_COB_ID, b"", period_s, max(2, math.ceil(AHEAD_S / period_s)))
         self._by_kernel = False
         self._seen = False
+        self._missed_since_s = 0.0
+        self._told_missing: bool | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._due_s = 0.0
         bus.hear(SYNC_COB_ID, self._on_sync)
@@ -58,6 +62,7 @@ class SyncPace:
     def start(self) -> None:
         """Tick from now on, on the running loop."""
         self._loop = asyncio.get_running_loop()
+        self._missed_since_s = self._loop.time()
         self._expect(self._loop.time() + self._period_s)
 
     def stop(self) -> None:
@@ -95,16 +100,26 @@ class SyncPace:
     def _on_timer(self) -> None:
         now = self._loop.time()
         if self._by_kernel:
-            LOGGER.warning("no SYNC of the kernel on %s: the daemon sends it until one gets through", self._name)
             self._frame.stop()
             self._by_kernel = False
+            self._missed_since_s = now
         elif self._seen and self._frame.start():
-            LOGGER.info("SYNC on %s comes from the kernel", self._name)
             self._by_kernel = True
+            self._tell(missing=False)
             self._expect(now + PATIENCE * self._period_s)
             return
+        elif now - self._missed_since_s > WORTH_TELLING_S:
+            self._tell(missing=True)
         self._seen = False
         self.max_lateness_s = max(self.max_lateness_s, now - self._due_s)
         self._expect(max(now, self._due_s + self._period_s))
         self.synced = False
         self._callback()
+
+    def _tell(self, *, missing: bool) -> None:
+        """Let the log know what has changed since it was told last."""
+        if missing and not self._told_missing:
+            LOGGER.warning("no SYNC of the kernel on %s: the daemon sends it until one gets through", self._name)
+        elif not missing and self._told_missing is not False:
+            LOGGER.info("SYNC on %s comes from the kernel", self._name)
+        self._told_missing = missing

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import math
 
 import pytest
@@ -170,3 +171,20 @@ async def test_a_pace_that_was_stopped_leaves_no_sync_behind(robot: Robot) -> No
     ticked = len(robot.ticks)
     await asyncio.sleep(1.0)
     assert (len(robot.ticks), robot.timer.timer) == (ticked, None)
+
+
+async def test_the_log_tells_of_a_sync_that_stays_away_but_not_of_a_short_pause(
+    robot: Robot, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.INFO):
+        robot.pace.start()
+        for pause_s in (0.5, 0.5, 2.0):
+            robot.wire.works = True
+            await asyncio.sleep(0.2)
+            robot.wire.works = False
+            await asyncio.sleep(pause_s)
+        robot.wire.works = True
+        await asyncio.sleep(0.2)
+        robot.pace.stop()
+    comes, stays_away = "SYNC on can0 comes from the kernel", "no SYNC of the kernel on can0"
+    assert [message.partition(":")[0] for message in caplog.messages] == [comes, stays_away, comes]
