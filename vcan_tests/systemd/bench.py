@@ -1,0 +1,248 @@
+"""A robot as a service in the guest: its unit under systemd, its simulated network as another, and who looks on."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import shutil
+import signal
+import socket
+import struct
+import subprocess
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import canhelm
+from canhelm.client import Client
+from drivers.epos.objects import OBJECTS
+from drivers.epos.state_machine import state_of
+from profiles.loader import load
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / "dist" / f"canhelm_{canhelm.__version__}_amd64.deb"
+BUS = "vcan0"
+SERVICE = "canhelm@max2d.service"
+SOCKET_UNIT = "canhelm@max2d.socket"
+SIMULATOR = "simulator.service"
+SOCKET = Path("/run/canhelm/max2d.sock")
+PROFILE = Path("/etc/canhelm/robots/max2d.yaml")
+SETTINGS = Path("/etc/canhelm/max2d.env")
+PATIENT = """\
+schema_version: 1
+extends: robots/max2d
+network: {cycle_hz: 50, guard_time_ms: 1000, life_time_factor: 4}
+"""
+"""Half the frames, and guarding that outlives the pauses of a loaded machine; how fast it works is proven elsewhere."""
+WITHIN_S = 60.0
+"""Time that anything may take, on a machine that has other work as well."""
+
+
+def tell(*command: str, user: str = "root") -> subprocess.CompletedProcess[str]:
+    """Run a command to its end, whatever that is."""
+    switch = () if user == "root" else ("runuser", "-u", user, "--")
+    return subprocess.run([*switch, *command], capture_output=True, text=True, timeout=WITHIN_S)
+
+
+def told(*command: str) -> str:
+    """What a command prints that has to succeed."""
+    ended = tell(*command)
+    assert ended.returncode == 0, (command, ended.stdout, ended.stderr)
+    return ended.stdout.strip()
+
+
+async def until(condition: Callable[[], object], within_s: float = WITHIN_S) -> None:
+    """Wait for what other processes do."""
+    loop = asyncio.get_running_loop()
+    deadline = loop.time() + within_s
+    while not condition():
+        assert loop.time() < deadline, told("journalctl", "--unit", SERVICE, "--lines=40", "--output=cat")
+        await asyncio.sleep(0.1)
+
+
+class Journal:
+    """What a unit has said, and systemd about it, since this object was made."""
+
+    def __init__(self, unit: str = SERVICE) -> None:
+        self._unit = unit
+        self._since = f"--since=@{time.time():.6f}"
+
+    def read(self, *options: str) -> str:
+        """The lines, without time and host unless the options say otherwise."""
+        told("journalctl", "--sync")
+        return told("journalctl", "--unit", self._unit, self._since, "--quiet", "--output=cat", *options)
+
+    async def has(self, text: str, *options: str) -> None:
+        """Wait until it was said; what a service writes reaches the journal a little later."""
+        await until(lambda: text in self.read(*options))
+
+
+class Robot:
+    """The robot max2d as a service, on ``vcan0``, with its simulated network beside it."""
+
+    async def make_idle(self) -> None:
+        """Up, with all nodes, at rest, nothing latched; begins anew unless it is so already."""
+        if not (self._as_installed() and self._is_idle()):
+            self.clear()
+            await self.begin()
+
+    async def begin(self) -> None:
+        """Switch the motor power on and start the service; returns when it is idle."""
+        self.simulate()
+        told("systemctl", "start", SERVICE)
+        await self.until_state("idle")
+
+    def clear(self) -> None:
+        """Neither service nor network run; package, settings and profile are as they should be."""
+        if not self._as_installed():
+            told("dpkg", "--install", str(PACKAGE))
+        self.switch_off()
+        tell("systemctl", "stop", SERVICE, SOCKET_UNIT)
+        tell("systemctl", "reset-failed")
+        PROFILE.write_text(PATIENT)
+        SETTINGS.write_text(f"CANHELM_BUS=socketcan:{BUS}\n")
+
+    def _as_installed(self) -> bool:
+        version = tell("dpkg-query", "--show", "--showformat=${db:Status-Status} ${Version}", "canhelm").stdout
+        return version == f"installed {canhelm.__version__}" and shutil.which("canhelm") is not None
+
+    def _is_idle(self) -> bool:
+        if not PROFILE.exists() or PROFILE.read_text() != PATIENT or self.show("ActiveState") != "active":
+            return False
+        return self.show("StatusText") == "idle" and self.show("ActiveState", SIMULATOR) == "active"
+
+    # -- the network ----------------------------------------------------------------------------------------------
+
+    def simulate(self, *options: str) -> None:
+        """Switch the motor power on: the nodes begin to boot."""
+        run = ("systemd-run", "--quiet", "--collect", f"--unit={SIMULATOR}", "--property=Nice=-10")
+        told(*run, "/usr/bin/canhelm", "simulate", "--profile", "max2d", "--bus", f"socketcan:{BUS}", *options)
+
+    def switch_off(self) -> None:
+        """Take the motor power away."""
+        tell("systemctl", "kill", "--signal=KILL", SIMULATOR)
+
+    def read(self, node: int, name: str) -> int:
+        """An object of a drive, read over the bus as anybody could."""
+        entry = OBJECTS[name]
+        with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as bus:
+            bus.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, struct.pack("=II", 0x580 + node, 0x7FF))
+            bus.bind((BUS,))
+            bus.settimeout(WITHIN_S)
+            request = struct.pack("<BHB4x", 0x40, entry.index, entry.sub)
+            bus.send(struct.pack("=IB3x8s", 0x600 + node, 8, request))
+            return int.from_bytes(bus.recv(16)[12:16], "little")
+
+    def powered(self) -> list[str]:
+        """Drives whose power stages are on, by their own words."""
+        states = {name: state_of(self.read(drive.node, "statusword")) for name, drive in _MAX2D.drives.items()}
+        return [name for name, state in states.items() if state is None or state.power_stage_on]
+
+    def released(self) -> list[str]:
+        """Steering brakes whose coils are energised: an output sinks current where its bit is 0."""
+        words = {
+            name: self.read(_MAX2D.drives[brake.drive].node, "digital_output_functions_state")
+            for name, brake in _MAX2D.brakes.items()
+        }
+        return [name for name, word in words.items() if not word >> _MAX2D.brakes[name].output_bit & 1]
+
+    # -- the service ----------------------------------------------------------------------------------------------
+
+    def show(self, what: str, unit: str = SERVICE) -> str:
+        """A property of a unit."""
+        return told("systemctl", "show", "--property", what, "--value", unit)
+
+    @property
+    def pid(self) -> int:
+        """The daemon's process."""
+        return int(self.show("MainPID"))
+
+    @property
+    def restarts(self) -> int:
+        """How often systemd has started it again by itself."""
+        return int(self.show("NRestarts"))
+
+    def entered_active_s(self) -> float:
+        """When it became ready last, wall-clock time [s]."""
+        micros = tell("systemctl", "show", "--property=ActiveEnterTimestamp", "--timestamp=us+utc", "--value", SERVICE)
+        return datetime.strptime(micros.stdout.strip(), "%a %Y-%m-%d %H:%M:%S.%f UTC").replace(tzinfo=UTC).timestamp()
+
+    def send(self, number: signal.Signals) -> float:
+        """Send the daemon a signal, and nobody else; the wall-clock time of it [s]."""
+        pid = self.pid
+        sent_s = time.time()
+        os.kill(pid, number)
+        return sent_s
+
+    def call(self, method: str, **params: Any) -> dict[str, Any]:
+        """Call a method of its API."""
+        with Client(SOCKET) as client:
+            return client.call(method, **params)
+
+    def status(self) -> dict[str, Any]:
+        """What `canhelm status` gets."""
+        return self.call("status")
+
+    async def until_state(self, state: str) -> None:
+        """Wait for a state of the vehicle."""
+        await until(lambda: self.show("StatusText") == state)
+
+    async def drive(self, speed_m_s: float = 0.3) -> None:
+        """Begin to drive for a long time; returns at speed."""
+        self.call("drive.parallel", angle_deg=0.0, speed_m_s=speed_m_s, duration_s=600.0, wait=False)
+        await until(lambda: self.speed_m_s() > 0.9 * speed_m_s)
+
+    async def turn_front_pair(self) -> None:
+        """Begin to turn a pair of wheels by much; returns while it turns."""
+        self.call("steer", pair="front", angle_deg=80.0, wait=False)
+        await until(lambda: self.speed_m_s() > 0.02 and "released" in self.brakes())
+
+    def brakes(self) -> list[str]:
+        """States of the steering brakes, by the daemon's words."""
+        return [brake["state"] for brake in self.status()["brakes"]]
+
+    def speed_m_s(self) -> float:
+        """The fastest wheel's speed."""
+        speeds = [abs(float(node["speed_m_s"])) for node in self.status()["nodes"] if "speed_m_s" in node]
+        return max(speeds)
+
+
+_MAX2D = load("max2d").profile
+
+
+class Witness:
+    """``candump`` on ``vcan0``, with the kernel's times; its frames can be read when it has ended.
+
+    Attributes:
+        frames: wall-clock time [s], identifier and data of each.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.frames: list[tuple[float, int, bytes]] = []
+        self._log = folder / "witness.log"
+
+    def __enter__(self) -> Witness:
+        with self._log.open("w") as log:
+            self._process = subprocess.Popen(["candump", "-L", BUS], stdout=log)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._process.terminate()
+        self._process.wait()
+        for line in self._log.read_text().splitlines():
+            stamp, _interface, frame = line.split()
+            can_id, _hash, data = frame.partition("#")
+            if not data.startswith("R"):
+                self.frames.append((float(stamp.strip("()")), int(can_id, 16), bytes.fromhex(data)))
+
+    def answered_s(self, node: int, name: str, after_s: float) -> list[float]:
+        """When a drive confirmed that an object was written, by SDO; later than a moment."""
+        entry = OBJECTS[name]
+        confirmation = struct.pack("<BHB", 0x60, entry.index, entry.sub)
+        return [
+            stamp_s
+            for stamp_s, can_id, data in self.frames
+            if can_id == 0x580 + node and data.startswith(confirmation) and stamp_s > after_s
+        ]

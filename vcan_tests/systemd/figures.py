@@ -1,0 +1,95 @@
+"""What the service's documentation shows: the journal of one life, and the times of a clean-up.
+
+In the guest: ``python -m vcan_tests.kernel --systemd -- .venv/bin/python -m vcan_tests.systemd.figures``.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from vcan_tests.systemd.bench import PATIENT, PROFILE, SERVICE, Journal, Robot, Witness, told, until
+
+FRONT_LEFT = 3
+"""The drive that carries the front brake on its output."""
+BRAKE_CLOSES_S = 0.05
+SHIPPED = "schema_version: 1\nextends: robots/max2d\n"
+
+
+@dataclass(frozen=True)
+class CleanUp:
+    """Times after `kill -9` while the front pair turns [s].
+
+    Attributes:
+        stopped_s: until the last drive was told to stop.
+        engaged_s: until the brake was engaged, its closing time included.
+        off_s: until the last drive was switched off.
+        ready_s: until the service could be asked again.
+    """
+
+    stopped_s: float
+    engaged_s: float
+    off_s: float
+    ready_s: float
+
+    def __str__(self) -> str:
+        return (
+            f"drives told to stop after {self.stopped_s:.2f} s, brake engaged after {self.engaged_s:.2f} s, "
+            f"drives off after {self.off_s:.2f} s, ready again after {self.ready_s:.2f} s"
+        )
+
+
+async def one_life(robot: Robot) -> Journal:
+    """Start without motor power, drive, lose a drive, recover, stop; the journal of it."""
+    robot.clear()
+    journal = Journal()
+    told("systemctl", "start", SERVICE)
+    await until(lambda: robot.show("StatusText").startswith("waiting for"))
+    robot.simulate()
+    await robot.until_state("idle")
+    await robot.drive()
+    told("cansend", "vcan0", f"000#81{FRONT_LEFT:02X}")  # what a short loss of its supply does, too
+    await until(lambda: robot.show("StatusText").startswith("fault: stopped by a fault that is gone"))
+    told("canhelm", "reset")
+    await robot.until_state("idle")
+    await robot.drive()
+    told("systemctl", "stop", SERVICE)
+    return journal
+
+
+async def clean_up_of_a_turning_pair(robot: Robot, folder: Path) -> CleanUp:
+    """Kill the daemon while a pair turns, its brake released; by what was on the bus, and by systemd's own words."""
+    restarts = robot.restarts
+    with Witness(folder) as witness:
+        await robot.turn_front_pair()
+        killed_s = robot.send(signal.SIGKILL)
+        await until(lambda: robot.restarts > restarts and robot.show("ActiveState") == "active")
+    told_to_stop_s = max(witness.answered_s(node, "controlword", killed_s)[0] for node in (1, 2, 3, 4))
+    engaged_s = witness.answered_s(FRONT_LEFT, "digital_output_functions_state", killed_s)[0] + BRAKE_CLOSES_S
+    off_s = max(witness.answered_s(node, "controlword", killed_s)[1] for node in (1, 2, 3, 4))
+    ready_s = robot.entered_active_s()
+    return CleanUp(*(moment_s - killed_s for moment_s in (told_to_stop_s, engaged_s, off_s, ready_s)))
+
+
+async def main() -> None:
+    """Print it all."""
+    robot = Robot()
+    journal = await one_life(robot)
+    await journal.has("Deactivated successfully")
+    print(journal.read("--output=short", "--no-hostname"))
+    with tempfile.TemporaryDirectory() as folder:
+        for name, profile in (("half as many cycles", PATIENT), ("as shipped", SHIPPED)):
+            robot.clear()
+            PROFILE.write_text(profile)
+            await robot.begin()
+            print(
+                f"kill -9 while a pair turns, profile {name}: {await clean_up_of_a_turning_pair(robot, Path(folder))}"
+            )
+
+
+if __name__ == "__main__":
+    sys.exit(asyncio.run(main()))
