@@ -1,0 +1,120 @@
+"""What becomes of a robot when its daemon, or its network, is killed or suspended."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from vcan_tests.vcan.bench import Bench, Daemon, Simulator, bench, patient, speeds
+from vcan_tests.vcan.stethoscope import (
+    BRAKE_ENGAGED,
+    DRIVES,
+    OUTPUTS,
+    STATUSWORD,
+    at_rest_after,
+    emergencies_after,
+    stethoscope,
+)
+
+pytestmark = [pytest.mark.vcan, pytest.mark.timeout(120)]
+
+SPEED_M_S, STEERING_M_S = 0.5, 0.15
+LIFE_TIME_S = 0.3
+MARGIN_S = 0.05
+LIFE_GUARDING = 0x8130
+REAR_RIGHT, FRONT_LEFT = 1, 3
+"""The drives with the brakes."""
+POWER_STAGE = 1 << 4
+"""Voltage enabled, in the statusword."""
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Iterator[Bench]:
+    with bench(tmp_path) as made:
+        yield made
+
+
+@pytest.fixture
+def patient_robot(tmp_path: Path) -> Iterator[Bench]:
+    with bench(tmp_path, patient()) as made:
+        yield made
+
+
+def longest_stop_s(speed_m_s: float) -> float:
+    """Life time and quick-stop ramp."""
+    return LIFE_TIME_S + speed_m_s / min(drive.quick_stop_m_s2 for drive in DRIVES.values()) + MARGIN_S
+
+
+@pytest.mark.real_time
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_without_its_daemon_a_driving_robot_is_stopped_by_its_drives(robot: Bench, number: signal.Signals) -> None:
+    robot.drive(SPEED_M_S)
+    struck_s = robot.daemon.signal(number)
+    with stethoscope() as heard:
+        heard.listen_until_rest()
+        brakes = [heard.read(node, OUTPUTS) & BRAKE_ENGAGED for node in (REAR_RIGHT, FRONT_LEFT)]
+    frames = robot.wire.frames(struck_s)
+    for node in DRIVES:
+        assert at_rest_after(frames, node, struck_s) < longest_stop_s(SPEED_M_S)
+        assert [code for code, _ in emergencies_after(frames, node, struck_s)] == [LIFE_GUARDING]
+    assert all(brakes)
+
+
+@pytest.mark.real_time
+def test_a_pair_that_turns_is_stopped_too_and_its_brake_stays_released_until_somebody_makes_it_safe(
+    robot: Bench,
+) -> None:
+    robot.turn_pair()
+    struck_s = robot.daemon.signal(signal.SIGKILL)
+    with stethoscope() as heard:
+        heard.listen_until_rest()
+        frames = robot.wire.frames(struck_s)
+        assert max(at_rest_after(frames, node, struck_s) for node in DRIVES) < longest_stop_s(STEERING_M_S)
+        assert not heard.read(FRONT_LEFT, OUTPUTS) & BRAKE_ENGAGED
+    made_safe = robot.daemon.canhelm("make-safe", "--profile", str(robot.profile), "--bus", "socketcan:vcan0")
+    assert made_safe.returncode == 0, made_safe.stderr
+    with stethoscope() as heard:
+        assert heard.read(FRONT_LEFT, OUTPUTS) & BRAKE_ENGAGED
+        assert not any(heard.read(node, STATUSWORD) & POWER_STAGE for node in DRIVES)
+
+
+def test_the_next_daemon_engages_the_brake_that_a_killed_one_had_released(patient_robot: Bench) -> None:
+    robot = patient_robot
+    robot.turn_pair()
+    robot.daemon.signal(signal.SIGKILL)
+    robot.daemon.end()
+    robot.daemon = Daemon(robot.profile)
+    robot.daemon.wait_for_state("idle")
+    with stethoscope() as heard:
+        assert heard.read(FRONT_LEFT, OUTPUTS) & BRAKE_ENGAGED
+    assert robot.daemon.canhelm("steer", "front", "5").returncode == 0
+
+
+def test_a_suspended_daemon_that_goes_on_tells_of_the_stop_and_drives_again_after_a_reset(robot: Bench) -> None:
+    robot.drive(SPEED_M_S)
+    robot.daemon.signal(signal.SIGSTOP)
+    with stethoscope() as heard:
+        heard.listen_until_rest()
+    robot.daemon.signal(signal.SIGCONT)
+    assert "life guarding" in robot.daemon.wait_for_state("fault")
+    assert robot.daemon.canhelm("reset").returncode == 0
+    robot.daemon.wait_for_state("idle")
+    assert robot.daemon.canhelm("steer", "front", "5").returncode == 0
+
+
+def test_a_robot_whose_network_is_killed_is_in_fault_and_ready_again_with_the_next_one(patient_robot: Bench) -> None:
+    robot = patient_robot
+    robot.drive(SPEED_M_S)
+    robot.simulator.process.kill()
+    assert "no node answers" in robot.daemon.wait_for_state("fault")
+    robot.simulator.end()
+    robot.simulator = Simulator(robot.profile)
+    robot.daemon.wait_for(lambda status: {node["node_state"] for node in status["nodes"]} == {"ready"})
+    assert robot.daemon.canhelm("reset").returncode == 0
+    assert max(speeds(robot.daemon.status())) == 0.0
+    assert (
+        robot.daemon.canhelm("drive", "parallel", "--angle", "0", "--speed", "0.3", "--duration", "0.3").returncode == 0
+    )
