@@ -69,9 +69,8 @@ class ServiceManager:
         status = self._status()
         if status == self._told:
             self._send("WATCHDOG=1")
-        else:
+        elif self._send("WATCHDOG=1", f"STATUS={status}"):
             self._told = status
-            self._send("WATCHDOG=1", f"STATUS={status}")
 
     def reloading(self) -> None:
         """A reload has begun; :meth:`ready` ends it."""
@@ -92,9 +91,10 @@ class ServiceManager:
         sentence = self.sentence()
         return " ".join((f"{sentence} - {self.remark}" if self.remark else sentence).split())
 
-    def _send(self, *lines: str) -> None:
+    def _send(self, *lines: str) -> bool:
+        """Whether it was heard."""
         if self._socket is None:
-            return
+            return False
         try:
             self._socket.sendto("\n".join(lines).encode(), socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL, self._address)
             self._mute = False
@@ -102,3 +102,5 @@ class ServiceManager:
             if not self._mute:
                 LOGGER.warning("the service manager does not hear %s: %s", lines[0], error)
             self._mute = True
+            return False
+        return True

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import socket
 from collections.abc import Iterator
@@ -55,6 +56,24 @@ def test_the_status_is_told_when_it_has_changed(manager: Manager, notifier: Serv
         ["WATCHDOG=1", "STATUS=fault: node 3 (front_left) is lost"],
         ["WATCHDOG=1"],
     ]
+
+
+def test_a_status_that_a_busy_manager_did_not_hear_is_told_again(manager: Manager, notifier: ServiceManager) -> None:
+    notifier.ready()
+    fill(manager)
+    notifier.sentence = lambda: "fault"
+    notifier.good_cycle(1.0)
+    manager.heard()
+    notifier.good_cycle(2.0)
+    assert manager.heard() == [["WATCHDOG=1", "STATUS=fault"]]
+
+
+def fill(manager: Manager) -> None:
+    """Leave the manager no room for another message."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender, contextlib.suppress(BlockingIOError):
+        sender.setblocking(False)
+        while True:
+            sender.sendto(b"", os.fspath(manager.path))
 
 
 def test_a_status_is_one_line_whatever_is_in_it(manager: Manager, notifier: ServiceManager) -> None:
