@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import signal
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
@@ -15,6 +16,9 @@ from vcan_tests.awake import awake_processors
 
 hypothesis.settings.register_profile("canhelm", deadline=None)
 hypothesis.settings.load_profile("canhelm")
+
+for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
+    signal.signal(number, handler)  # nohup and shells in the background have them ignored, and processes inherit that
 
 NEEDS = {
     "vcan": [Path("/sys/class/net/vcan0"), Path("/sys/class/net/vcan1")],
