@@ -154,6 +154,8 @@ class Stopping:
         self._halt(Refused("the motion was stopped: the daemon is going down"))
         if powered:
             await self._stop_and_disable()
+            self.rest.begin_anew()  # wheels may settle when their torque goes
+            await self.until_rest()
 
     async def reset(self) -> None:
         """Clear the latched emergency stop and faults.

@@ -144,6 +144,24 @@ async def test_a_reset_right_after_an_emergency_stop_returns_when_the_vehicle_ca
         await robot.call("steer", pair="front", angle_deg=1.0)
 
 
+async def test_a_wheel_that_settles_when_its_torque_goes_is_waited_for_at_the_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async with running_robot() as robot:
+        last = robot.app.devices.drives["front_right"]
+        disable = last.disable
+
+        async def disable_and_settle() -> None:
+            await disable()
+            last.speed_m_s = 0.02  # until its next reading
+
+        monkeypatch.setattr(last, "disable", disable_and_settle)
+        driving = _begin(robot, "drive.parallel", angle_deg=0.0, speed_m_s=0.3, duration_s=60.0)
+        await robot.until(lambda: robot.speed_m_s > 0.28)
+        assert await robot.app.supervisor.close() == ()
+        await asyncio.wait([driving])
+
+
 async def test_nothing_begins_while_the_daemon_goes_down() -> None:
     async with running_robot() as robot:
         enabling = _begin(robot, "motor.enable", node=1)
