@@ -161,4 +161,4 @@ class Client:
 
 
 def _gone() -> DaemonNotRunning:
-    return DaemonNotRunning("the daemon hung up", remedy="look at its last words: journalctl -u canhelm")
+    return DaemonNotRunning("the daemon hung up", remedy="look at its last words: journalctl -u 'canhelm@*'")

@@ -143,7 +143,7 @@ class Client:
     def _gone(self) -> DaemonNotRunning:
         return DaemonNotRunning(
             f"the daemon on {self.path} hung up",
-            remedy="look at its last words: journalctl -u canhelm, or its terminal",
+            remedy="look at its last words: journalctl -u 'canhelm@*', or its terminal",
         )
 
     def _hung(self) -> Timeout:

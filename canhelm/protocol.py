@@ -194,7 +194,8 @@ def _only_one(live: list[Path]) -> Path:
     if SYSTEM_FOLDER.is_dir() and not os.access(SYSTEM_FOLDER, os.R_OK | os.X_OK):
         raise _refused(SYSTEM_FOLDER)
     raise DaemonNotRunning(
-        "no daemon is running", remedy="start one: canhelm run --simulate --profile max2d, or systemctl start canhelm"
+        "no daemon is running",
+        remedy="start one: canhelm run --simulate --profile max2d, or systemctl start canhelm@NAME",
     )
 
 
@@ -233,7 +234,7 @@ def open_socket(path: str | os.PathLike[str], timeout_s: float = 5.0) -> socket.
 
 def _how_to_start(path: Path) -> str:
     if path.parent in (SYSTEM_FOLDER, user_folder()):
-        return "start it: canhelm run --profile NAME (add --simulate without hardware), or systemctl start canhelm"
+        return "start it: canhelm run --profile NAME (add --simulate without hardware), or systemctl start canhelm@NAME"
     return f"start it: canhelm run --profile NAME --socket {path} (add --simulate without hardware)"
 
 

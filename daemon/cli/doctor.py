@@ -195,7 +195,7 @@ def _daemon_findings(options: Options) -> Iterator[Finding]:
     chosen = options.socket or options.robot
     live = protocol.find_sockets()
     if not chosen and not live:
-        start = "canhelm run --simulate --profile max2d, or: systemctl start canhelm"
+        start = "canhelm run --simulate --profile max2d, or: systemctl start canhelm@NAME"
         yield Finding("daemon", "note", "no daemon is running", start)
         return
     for path in [None] if chosen else live:
