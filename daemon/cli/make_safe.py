@@ -32,15 +32,24 @@ def make_safe(*, profile: str, bus: str) -> int:
         bus: The bus of the daemon: `socketcan:can0` or `rs232:/dev/ttyS0@115200`.
     """
     from daemon.cli.run import simulates
-    from profiles.kept import kept, runtime_folder
-    from profiles.loader import load
 
     if simulates(bus):
         say("the network was simulated and has gone with its daemon")
         return 0
+    return asyncio.run(_within_time(_robot(profile), bus))
+
+
+def _robot(named: str) -> Profile:
+    """The profile that the daemon had, else that of this name; reading files and checking them takes its time."""
+    from profiles.kept import kept, runtime_folder
+
     folder = runtime_folder(os.environ)
     robot = kept(folder) if folder else None
-    return asyncio.run(_within_time(robot or load(profile).profile, bus))
+    if robot is None:
+        from profiles.loader import load
+
+        robot = load(named).profile
+    return robot
 
 
 async def _within_time(profile: Profile, spec: str) -> int:

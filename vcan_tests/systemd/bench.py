@@ -169,12 +169,9 @@ class Robot:
         micros = tell("systemctl", "show", "--property=ActiveEnterTimestamp", "--timestamp=us+utc", "--value", SERVICE)
         return datetime.strptime(micros.stdout.strip(), "%a %Y-%m-%d %H:%M:%S.%f UTC").replace(tzinfo=UTC).timestamp()
 
-    def send(self, number: signal.Signals) -> float:
-        """Send the daemon a signal, and nobody else; the wall-clock time of it [s]."""
-        pid = self.pid
-        sent_s = time.time()
-        os.kill(pid, number)
-        return sent_s
+    def send(self, number: signal.Signals) -> None:
+        """Send the daemon a signal, and nobody else."""
+        os.kill(self.pid, number)
 
     def call(self, method: str, **params: Any) -> dict[str, Any]:
         """Call a method of its API."""
