@@ -23,7 +23,8 @@ demo: $(VENV)/.stamp-demo ## the simulated robot drives the published manoeuvres
 	$(VENV)/bin/canhelm demo --out $(OUT)
 
 test: lint ## style, types, import rules, then all tests
-	$(VENV)/bin/pytest
+	$(VENV)/bin/pytest -n auto --dist loadfile -m 'not real_time and not vcan and not systemd'
+	$(VENV)/bin/pytest -m 'real_time and not vcan and not systemd'
 
 vcan-test: $(VENV)/.stamp-test ## the tests on a kernel's CAN bus and under a real systemd, both booted if need be
 	$(VENV)/bin/python -m vcan_tests.kernel.suite $(ARGS)

@@ -33,19 +33,20 @@ def pytest_asyncio_loop_factories(item: pytest.Item) -> Mapping[str, Callable[[]
     return {"virtual": VirtualTimeLoop}
 
 
+@pytest.hookimpl(tryfirst=True)  # before the marks choose
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Tests in real time get a second and a third try: a loaded machine may stand still for longer than they allow."""
     for item in items:
-        real = any(item.get_closest_marker(mark) for mark in ("real_time", *NEEDS))
-        if real or "bench" in getattr(item, "fixturenames", ()):
+        if "bench" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.real_time)
+        if any(item.get_closest_marker(mark) for mark in ("real_time", *NEEDS)):
             item.add_marker(pytest.mark.flaky(reruns=2))
 
 
 @pytest.fixture(autouse=True)
 def _awake(request: pytest.FixtureRequest) -> Iterator[None]:
     """A test in real time is not to wait for a sleeping processor."""
-    real = request.node.get_closest_marker("real_time") or "bench" in request.fixturenames
-    with awake_processors() if real else contextlib.nullcontext():
+    with awake_processors() if request.node.get_closest_marker("real_time") else contextlib.nullcontext():
         yield
 
 

@@ -17,6 +17,7 @@ FAILURES = {
     8: LimitExceeded("9000 rpm is beyond the limit", node=8, limit="8000 rpm", remedy="ask for less"),
     9: EmergencyStop("the emergency stop is latched", node=9, remedy="canhelm reset"),
 }
+SHORT_WAY_S = 0.05
 ENDLESS_S = 60.0
 
 
@@ -96,7 +97,8 @@ class FakeBackend:
         if failure is not None:
             raise failure
         if lease is not None and "wait" in params:
-            await self._move(lease, params.get("duration_s") or ENDLESS_S)
+            way_s = SHORT_WAY_S if method == "drive.to" else ENDLESS_S
+            await self._move(lease, params.get("duration_s") or way_s)
         return {"motion": "1"} if "wait" in params else {"state": self.state}
 
     async def _move(self, lease: str, duration_s: float) -> None:
