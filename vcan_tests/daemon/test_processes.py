@@ -17,7 +17,7 @@ import pytest
 from canhelm.client import Client
 from canhelm.errors import CanhelmError
 
-TIMEOUT_S = 20
+TIMEOUT_S = 60
 PATIENT_PROFILE = """
 schema_version: 1
 name: max2d
@@ -128,7 +128,7 @@ SEQUENCE = (
 
 
 @pytest.mark.real_time
-@pytest.mark.timeout(120)
+@pytest.mark.timeout(300)
 @pytest.mark.parametrize("bus", ["simulated", "rs232"])
 def test_the_same_commands_end_alike_over_can_and_over_a_serial_line(bus: str, tmp_path: Path) -> None:
     bench = Bench(tmp_path, bus)

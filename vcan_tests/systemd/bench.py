@@ -243,3 +243,14 @@ class Witness:
             for stamp_s, can_id, data in self.frames
             if can_id == 0x580 + node and data.startswith(confirmation) and stamp_s > after_s
         ]
+
+    def written(self, node: int, name: str, before_s: float) -> int:
+        """The value last written to an object of a drive, by SDO, before a moment."""
+        entry = OBJECTS[name]
+        address = struct.pack("<HB", entry.index, entry.sub)
+        values = [
+            int.from_bytes(data[4:], "little")
+            for stamp_s, can_id, data in self.frames
+            if can_id == 0x600 + node and data[:1] != b"\x40" and data[1:4] == address and stamp_s < before_s
+        ]
+        return values[-1]

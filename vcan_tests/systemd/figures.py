@@ -18,7 +18,10 @@ from vcan_tests.systemd.bench import PATIENT, PROFILE, SERVICE, Journal, Robot, 
 
 FRONT_LEFT = 3
 """The drive that carries the front brake on its output."""
+BRAKE_OUTPUT = 1 << 12
+"""Its bit of the output word; 0 energises the coil and releases the brake."""
 BRAKE_CLOSES_S = 0.05
+_OUTPUTS = "digital_output_functions_state"
 SHIPPED = "schema_version: 1\nextends: robots/max2d\n"
 
 
@@ -71,8 +74,9 @@ async def clean_up_of_a_turning_pair(robot: Robot, folder: Path) -> CleanUp:
         killed_s = time.time()
         os.kill(pid, signal.SIGKILL)
         await until(lambda: robot.restarts > restarts and robot.show("ActiveState") == "active")
+    assert not witness.written(FRONT_LEFT, _OUTPUTS, killed_s) & BRAKE_OUTPUT, "the brake was engaged before"
     told_to_stop_s = max(witness.answered_s(node, "controlword", killed_s)[0] for node in (1, 2, 3, 4))
-    engaged_s = witness.answered_s(FRONT_LEFT, "digital_output_functions_state", killed_s)[0] + BRAKE_CLOSES_S
+    engaged_s = witness.answered_s(FRONT_LEFT, _OUTPUTS, killed_s)[0] + BRAKE_CLOSES_S
     off_s = max(witness.answered_s(node, "controlword", killed_s)[1] for node in (1, 2, 3, 4))
     ready_s = robot.entered_active_s()
     return CleanUp(*(moment_s - killed_s for moment_s in (told_to_stop_s, engaged_s, off_s, ready_s)))
