@@ -12,7 +12,7 @@ PACKAGED = $(shell find canhelm daemon drivers profiles packaging systemd -type 
 PACKAGING = DESTDIR='$(DESTDIR)' PREFIX='$(PREFIX)' PYTHON='$(SERVICE_PYTHON)' PIP_PYTHON='$(VENV)/bin/python'
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test lint vcan-test install uninstall deb
+.PHONY: help venv demo test lint vcan-test vcan-figures install uninstall deb
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST)
@@ -28,6 +28,9 @@ test: lint ## style, types, import rules, then all tests
 
 vcan-test: $(VENV)/.stamp-test ## the tests on a kernel's CAN bus and under a real systemd, both booted if need be
 	$(VENV)/bin/python -m vcan_tests.kernel.suite $(ARGS)
+
+vcan-figures: $(VENV)/.stamp-test ## measure on a kernel's CAN bus: stops without a daemon, SYNC's period, tshark's verdict
+	$(VENV)/bin/python -m vcan_tests.vcan.figures
 
 install: | $(VENV)/bin/pip ## the service on this machine (as root): /opt/canhelm, units, users; see docs/service.md
 	$(PACKAGING) packaging/install.sh

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from canhelm.client import Client
+from daemon.demo import Figure
 from vcan_tests.manager import Manager
 from vcan_tests.vcan.witness import Witness, candump
 
@@ -87,6 +88,7 @@ class Daemon:
         bus: str = "socketcan:vcan0",
         options: Sequence[str] = (),
         command: Sequence[str] = COMMAND,
+        niceness: int = -10,
     ) -> None:
         self.socket = profile.with_suffix(".sock")
         self.log = profile.with_suffix(".txt")
@@ -98,7 +100,7 @@ class Daemon:
                 stdout=log,
                 stderr=log,
                 env={**os.environ, "NOTIFY_SOCKET": str(manager.path)},
-                preexec_fn=partial(os.nice, -10),
+                preexec_fn=partial(os.nice, niceness),
             )
         assert manager.hears(TIMEOUT_S), self.log.read_text()
         assert "READY=1" in manager.heard()[0], self.log.read_text()
@@ -137,9 +139,11 @@ class Daemon:
         deadline = time.monotonic() + TIMEOUT_S
         with Client(self.socket) as client:
             for method, status in client.notifications(rate_hz=10.0):
-                if method == "status" and condition(status):
+                if method != "status":
+                    continue
+                if condition(status):
                     return status
-                assert time.monotonic() < deadline, status
+                assert time.monotonic() < deadline, (status["message"], status)
         raise AssertionError("it hung up")
 
     def wait_for_state(self, state: str) -> str:
@@ -181,14 +185,18 @@ class Bench:
     def drive(self, speed_m_s: float) -> subprocess.Popen[str]:
         """Drive straight on; returns when the robot is at speed."""
         driving = self.daemon.begin("drive", "parallel", "--angle", "0", "--speed", str(speed_m_s), "--duration", "60")
-        self.daemon.wait_for(lambda status: min(speeds(status)) > 0.98 * speed_m_s)
+        self._moving(lambda status: min(speeds(status)) > 0.98 * speed_m_s)
         return driving
 
-    def turn_pair(self) -> subprocess.Popen[str]:
-        """Steer the front pair far; returns while its wheels turn it at full speed."""
+    def turn_pair(self, speed_m_s: float) -> subprocess.Popen[str]:
+        """Steer the front pair far; returns while its wheels turn it, which they do at that speed."""
         steering = self.daemon.begin("steer", "front", "80")
-        self.daemon.wait_for(lambda status: max(speeds(status)) > 0.14)
+        self._moving(lambda status: max(speeds(status)) > 0.9 * speed_m_s)
         return steering
+
+    def _moving(self, fast_enough: Callable[[Status], bool]) -> None:
+        status = self.daemon.wait_for(lambda status: fast_enough(status) or status["state"] == "fault")
+        assert status["state"] == "active", status["message"]
 
 
 @contextmanager
@@ -213,11 +221,12 @@ def bench(folder: Path, more: str = "", interface: str = "vcan0", options: Seque
             made.simulator.end()
 
 
+def words_of(figure: Figure) -> list[str]:
+    """The command that drives a published manoeuvre."""
+    method, parameters = figure.request()
+    return [*method.split("."), *(f"--{name.partition('_')[0]}={value}" for name, value in parameters.items())]
+
+
 def speeds(status: Status) -> list[float]:
     """Speeds of the wheels [m/s]."""
     return [abs(node["speed_m_s"]) for node in status["nodes"] if "speed_m_s" in node]
-
-
-def at_rest(status: Status) -> bool:
-    """Whether no wheel turns."""
-    return max(speeds(status)) < 0.01

@@ -5,22 +5,20 @@ from __future__ import annotations
 import select
 import socket
 import struct
-import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import ExitStack
 from math import tau
 
+from drivers.bus.broadcast_manager import RepeatedFrame
 from profiles.loader import load
 from vcan_tests.kernel.slcan_adapter import CAN_FRAME
 from vcan_tests.vcan.witness import Frame
 
 DRIVES = dict(enumerate(load("max2d").profile.drives.values(), start=1))
+LIFE_GUARDING = 0x8130
 AT_REST_M_S = 0.01
-SETTLED_S = 0.3
-"""Time at rest after which a drive is believed."""
 PERIOD_S = 0.01
-ANSWER_S = 1.0
-PATIENCE_S = 10.0
+ANSWER_S = 5.0
 
 Address = tuple[int, int]
 """Index and subindex of an object."""
@@ -34,52 +32,38 @@ _REQUEST = struct.Struct("<BHB4x")
 _ANSWER = struct.Struct("<BHBi")
 
 
-class Stethoscope:
-    """A raw socket that reads objects, one at a time; not beside a daemon or command that reads, too."""
-
-    def __init__(self, interface: str) -> None:
-        self._socket = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
-        self._socket.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, struct.pack("=II", 0x580, 0x780))
-        self._socket.settimeout(ANSWER_S)
-        self._socket.bind((interface,))
-
-    def close(self) -> None:
-        """Ask no more."""
-        self._socket.close()
-
-    def read(self, node: int, address: Address) -> int:
-        """The value of an object, signed, its unused bytes zero."""
-        self._socket.send(CAN_FRAME.pack(0x600 + node, 8, _REQUEST.pack(_READ, *address)))
-        while True:
-            can_id, _, data = CAN_FRAME.unpack(self._socket.recv(CAN_FRAME.size))
-            _, *answered, value = _ANSWER.unpack(data)
-            if (can_id, *answered) == (0x580 + node, *address):
-                return int(value)
-
-    def listen_until_rest(self) -> None:
-        """Read the velocities of all drives again and again until all have been at rest for a while."""
-        moved_s = begin_s = time.monotonic()
-        while time.monotonic() < moved_s + SETTLED_S:
-            if any(speed_m_s(node, self.read(node, VELOCITY)) >= AT_REST_M_S for node in DRIVES):
-                moved_s = time.monotonic()
-            assert moved_s < begin_s + PATIENCE_S, "they do not stop"
-            select.select([], [], [], PERIOD_S)
+def read(node: int, address: Address, interface: str = "vcan0") -> int:
+    """The value of an object, signed, its unused bytes zero; not beside a daemon that reads, too."""
+    with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as asking:
+        asking.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, struct.pack("=II", 0x580 + node, 0x7FF))
+        asking.settimeout(ANSWER_S)
+        asking.bind((interface,))
+        asking.send(CAN_FRAME.pack(0x600 + node, 8, _REQUEST.pack(_READ, *address)))
+        _, *answered, value = _ANSWER.unpack(CAN_FRAME.unpack(asking.recv(CAN_FRAME.size))[2])
+    assert tuple(answered) == address
+    return int(value)
 
 
-@contextmanager
-def stethoscope(interface: str = "vcan0") -> Iterator[Stethoscope]:
-    """One to read with while the ``with`` block lasts."""
-    made = Stethoscope(interface)
-    try:
-        yield made
-    finally:
-        made.close()
+def listen(for_s: float, interface: str = "vcan0") -> None:
+    """Let the kernel ask all drives for their velocities every 10 ms, for a while."""
+    with ExitStack() as stack:
+        for node in DRIVES:
+            request = _REQUEST.pack(_READ, *VELOCITY)
+            asking = RepeatedFrame(interface, 0x600 + node, request, PERIOD_S, round(for_s / PERIOD_S))
+            stack.callback(asking.close)
+            assert asking.start()
+        select.select([], [], [], for_s)
 
 
 def speed_m_s(node: int, velocity_rpm: int) -> float:
     """Speed of a drive's wheel at its rim."""
     drive = DRIVES[node]
     return abs(velocity_rpm) / 60.0 * tau * drive.wheel_radius_m / drive.total_ratio
+
+
+def stop_s(speed_m_s: float, life_time_s: float) -> float:
+    """Time that drives take to stand when their master has died: life time and quick-stop ramp."""
+    return life_time_s + speed_m_s / min(drive.quick_stop_m_s2 for drive in DRIVES.values())
 
 
 def at_rest_after(frames: Sequence[Frame], node: int, since_s: float) -> float:

@@ -14,15 +14,15 @@ from typing import NamedTuple
 LINE = re.compile(r"\((\d+\.\d+)\) \w+ ([0-9A-F]{3})#(?:(R)|([0-9A-F]*))\n")
 ROOM_BYTES = 4 << 20
 SERVICES = {
-    0x000: "NMT: ",
+    0x000: "NMT:",
     0x080: "EMCY",
     0x180: "PDO1 (tx)",
     0x200: "PDO1 (rx)",
     0x280: "PDO2 (tx)",
     0x400: "PDO3 (rx)",
-    0x580: "Default-SDO (tx): ",
-    0x600: "Default-SDO (rx): ",
-    0x700: "NMT Error Control: ",
+    0x580: "Default-SDO (tx)",
+    0x600: "Default-SDO (rx)",
+    0x700: "NMT Error Control",
 }
 """What tshark calls a frame, by the function code in its identifier."""
 
@@ -64,9 +64,13 @@ class Witness:
 
     def frames(self, since_s: float = 0.0) -> list[Frame]:
         """The frames up to now that are no older than a wall-clock time."""
-        found = LINE.findall(self.text())
-        frames = [Frame(float(at), int(can_id, 16), bool(r), bytes.fromhex(data)) for at, can_id, r, data in found]
-        return [frame for frame in frames if frame.time_s >= since_s]
+        return [frame for frame in frames_of(self.text()) if frame.time_s >= since_s]
+
+
+def frames_of(log: str) -> list[Frame]:
+    """The frames of a log."""
+    found = LINE.findall(log)
+    return [Frame(float(at), int(can_id, 16), bool(r), bytes.fromhex(data)) for at, can_id, r, data in found]
 
 
 @contextmanager
@@ -95,10 +99,13 @@ def unrecognised(log: Path) -> list[str]:
     return [line for line in lines.splitlines() if not _is_recognised(*line.split("|"))]
 
 
+def service_of(can_id: int) -> str:
+    """The service that an identifier stands for, in tshark's words."""
+    return "SYNC" if can_id == 0x080 else SERVICES.get(can_id & 0x780, "nothing that a node here has")
+
+
 def _is_recognised(can_id: str, remote: str, info: str) -> bool:
-    number = int(can_id)
-    service = "SYNC" if number == 0x080 else SERVICES.get(number & 0x780, "nothing")
-    return remote == "1" or info.startswith(service)
+    return remote == "1" or info.startswith(service_of(int(can_id)))
 
 
 def _tshark(log: Path, *options: str) -> str:
