@@ -33,9 +33,9 @@ SETTINGS = Path("/etc/canhelm/max2d.env")
 PATIENT = """\
 schema_version: 1
 extends: robots/max2d
-network: {cycle_hz: 50, guard_time_ms: 1000, life_time_factor: 4}
+network: {cycle_hz: 20, guard_time_ms: 1000, life_time_factor: 4}
 """
-"""Half the frames, and guarding that outlives the pauses of a loaded machine; how fast it works is proven elsewhere."""
+"""Few cycles, and guarding that outlives the pauses of a loaded machine; how fast it works is proven elsewhere."""
 WITHIN_S = 60.0
 """Time that anything may take, on a machine that has other work as well."""
 

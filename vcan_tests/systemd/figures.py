@@ -89,7 +89,7 @@ async def main() -> None:
     await journal.has("Deactivated successfully")
     print(journal.read("--output=short", "--no-hostname"))
     with tempfile.TemporaryDirectory() as folder:
-        for name, profile in (("half as many cycles", PATIENT), ("as shipped", SHIPPED)):
+        for name, profile in (("with 20 cycles a second", PATIENT), ("as shipped", SHIPPED)):
             robot.clear()
             PROFILE.write_text(profile)
             await robot.begin()
