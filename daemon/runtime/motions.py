@@ -9,7 +9,7 @@ from typing import Any
 
 from canhelm.errors import CanhelmError, Refused
 from daemon.loops.measurement import Command, Measurement
-from drivers.contract import Drive
+from drivers.contract import Drive, DriveState
 
 
 class Motion(ABC):
@@ -188,16 +188,17 @@ class DriveMove(Motion):
             await self._command()
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
-        """Watch the drive: over when its target is reached, its time is out or it was stopped."""
-        cut_short = bool(self.stop_reason)
+        """Watch the drive: over when its target is reached, or when it obeys the quick stop of a move cut short."""
         if self._remaining_s is not None:
             self._remaining_s -= dt_s
-            cut_short = cut_short or self._remaining_s <= 0.0
         elif not self._until_stopped:
             self._settled = self._settled + 1 if self._drive.at_target else 0
-        if cut_short:
-            self._drive.quick_stop()
-        if cut_short or self._settled >= self.SETTLE_CYCLES:
+        over = self._settled >= self.SETTLE_CYCLES
+        if self.stop_reason or (self._remaining_s is not None and self._remaining_s <= 0.0):
+            over = self._drive.state is not DriveState.ENABLED
+            if not over:
+                self._drive.quick_stop()
+        if over:
             self.finish({"position_m": round(self._drive.position_m, 6)})
         return self._zero
 

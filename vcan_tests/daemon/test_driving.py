@@ -82,6 +82,16 @@ async def test_a_current_for_a_time_turns_the_wheel_and_ends_at_rest() -> None:
         assert robot.app.devices.drives["rear_right"].state == "disabled"
 
 
+async def test_a_current_too_small_to_turn_the_wheel_leaves_an_enabled_drive_enabled() -> None:
+    async with running_robot() as robot:
+        await robot.call("motor.enable", node=2)
+        await robot.call("motor.current", node=2, current_ma=300.0, duration_s=0.2)
+        await asyncio.sleep(0.1)
+        drive = robot.app.devices.drives["rear_left"]
+        assert (drive.state, drive.mode, drive.fault) == ("enabled", drive.driving_mode, None)
+        await robot.call("motor.disable", node=2)
+
+
 async def test_a_stream_of_values_drives_and_a_stale_one_stops() -> None:
     async with running_robot() as robot:
         for _ in range(80):

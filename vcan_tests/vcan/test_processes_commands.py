@@ -34,6 +34,7 @@ TYPED = (
     ("drive parallel --angle 0 --speed 0.3 --duration 0.5", 0, "201#0F00"),
     ("drive turn --rear -4 --front 4 --speed 0.3 --duration 0.5", 0, "201#0F00"),
     ("drive rotate 20", 1, ""),
+    ("drive to 1 0", 1, ""),
     ("stop", 0, ""),
     ("estop", 0, ""),
     ("steer front 0", 6, ""),
