@@ -77,7 +77,7 @@ def test_a_command_ends_with_its_exit_code_and_has_been_on_the_wire(
     before = len(robot.wire.text())
     done = robot.daemon.canhelm(*typed.format(folder=robot.profile.parent).split())
     assert done.returncode == code, done.stderr
-    assert f" {frame}" in robot.wire.text()[before:]
+    assert robot.wire.comes_to_show(f" {frame}", begin=before)
 
 
 def test_the_monitor_shows_one_status_after_the_other_until_ctrl_c(robot: Bench) -> None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import re
+import select
 import subprocess
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -61,6 +63,15 @@ class Witness:
     def text(self) -> str:
         """The log up to now."""
         return self.log.read_text()
+
+    def comes_to_show(self, what: str, begin: int = 0, patience_s: float = 10.0) -> bool:
+        """Whether the log shows that text behind a place in it, now or soon."""
+        deadline = time.monotonic() + patience_s
+        while what not in self.text()[begin:]:
+            if time.monotonic() > deadline:
+                return False
+            select.select([], [], [], 0.05)
+        return True
 
     def frames(self, since_s: float = 0.0) -> list[Frame]:
         """The frames up to now that are no older than a wall-clock time."""
