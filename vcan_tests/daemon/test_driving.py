@@ -88,7 +88,7 @@ async def test_a_current_too_small_to_turn_the_wheel_leaves_an_enabled_drive_ena
         await robot.call("motor.current", node=2, current_ma=300.0, duration_s=0.2)
         await asyncio.sleep(0.1)
         drive = robot.app.devices.drives["rear_left"]
-        assert (drive.state, drive.mode, drive.fault) == ("enabled", drive.driving_mode, None)
+        assert (drive.state, drive.status()["mode"], drive.fault) == ("enabled", "profile velocity", None)
         await robot.call("motor.disable", node=2)
 
 
