@@ -14,9 +14,7 @@ import time
 from collections.abc import Callable
 from statistics import mean
 
-from daemon.loops.odometry import Pose
-from daemon.loops.path import Piece
-from vcan_tests.daemon.following_runs import (
+from daemon.campaigns.following_runs import (
     SPEED_M_S,
     Law,
     Run,
@@ -27,7 +25,9 @@ from vcan_tests.daemon.following_runs import (
     random_states,
     thesis_law,
 )
-from vcan_tests.daemon.semitrailer_plant import LINE_BACKWARDS
+from daemon.campaigns.ideal_semitrailer import LINE_BACKWARDS
+from daemon.loops.odometry import Pose
+from daemon.loops.path import Piece
 
 RATES_DEG_M = (200, 250, 300, 400, 600, 1000, None)
 

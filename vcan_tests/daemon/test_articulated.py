@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from daemon.campaigns.ideal_semitrailer import SEMITRAILER
 from daemon.loops.articulated import ArticulatedVehicle, Hitch
 from daemon.loops.odometry import Pose
-from vcan_tests.daemon.semitrailer_plant import SEMITRAILER
 
 HITCH = SEMITRAILER.hitches[0]
 TRAIN = ArticulatedVehicle(0.3, (Hitch(-0.02, 0.6), Hitch(0.15, 0.4), Hitch(0.0, 0.5)), math.radians(40), 1.2)

@@ -9,12 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from daemon.loops.articulated import ArticulatedVehicle
-from daemon.loops.cascade_following import CascadeFollower, CascadeTuning
-from daemon.loops.odometry import Pose
-from daemon.loops.path import Path, Piece, join_waypoints
-from daemon.loops.path_following import Limit
-from vcan_tests.daemon.following_runs import (
+from daemon.campaigns.following_runs import (
     Run,
     campaign,
     cascade_law,
@@ -23,7 +18,7 @@ from vcan_tests.daemon.following_runs import (
     random_states,
     thesis_law,
 )
-from vcan_tests.daemon.semitrailer_plant import (
+from daemon.campaigns.ideal_semitrailer import (
     CIRCLE_BACKWARDS,
     LINE_BACKWARDS,
     SEMITRAILER,
@@ -31,6 +26,11 @@ from vcan_tests.daemon.semitrailer_plant import (
     forwards,
     placed,
 )
+from daemon.loops.articulated import ArticulatedVehicle
+from daemon.loops.cascade_following import CascadeFollower, CascadeTuning
+from daemon.loops.odometry import Pose
+from daemon.loops.path import Path, Piece, join_waypoints
+from daemon.loops.path_following import Limit
 
 PIECES = [LINE_BACKWARDS, CIRCLE_BACKWARDS, forwards(LINE_BACKWARDS), forwards(CIRCLE_BACKWARDS)]
 

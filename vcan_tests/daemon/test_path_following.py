@@ -8,6 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from daemon.campaigns.following_runs import drive, thesis_law
+from daemon.campaigns.ideal_semitrailer import (
+    CIRCLE_BACKWARDS,
+    LINE_BACKWARDS,
+    SEMITRAILER,
+    Errors,
+    SemitrailerPlant,
+    forwards,
+    placed,
+)
 from daemon.loops.articulated import ArticulatedVehicle, Hitch
 from daemon.loops.odometry import Pose
 from daemon.loops.path import Path, Piece, join_waypoints, line
@@ -20,16 +30,6 @@ from daemon.loops.path_following import (
     circle_curvature,
     published_circle_curvature,
     published_target,
-)
-from vcan_tests.daemon.following_runs import drive, thesis_law
-from vcan_tests.daemon.semitrailer_plant import (
-    CIRCLE_BACKWARDS,
-    LINE_BACKWARDS,
-    SEMITRAILER,
-    Errors,
-    SemitrailerPlant,
-    forwards,
-    placed,
 )
 
 TUNING = FollowingTuning()

@@ -8,12 +8,8 @@ from typing import Any, Final
 
 import pytest
 
-from daemon.loops.articulated import hitch_point
-from daemon.loops.odometry import Pose
-from daemon.loops.path import Path, Piece, arc
-from daemon.loops.path_following import FollowingErrors, FollowingTuning, PathFollower
-from vcan_tests.daemon.following_runs import drive, thesis_law
-from vcan_tests.daemon.semitrailer_plant import (
+from daemon.campaigns.following_runs import drive, thesis_law
+from daemon.campaigns.ideal_semitrailer import (
     CIRCLE_BACKWARDS,
     LINE_BACKWARDS,
     SEMITRAILER,
@@ -22,6 +18,10 @@ from vcan_tests.daemon.semitrailer_plant import (
     forwards,
     placed,
 )
+from daemon.loops.articulated import hitch_point
+from daemon.loops.odometry import Pose
+from daemon.loops.path import Path, Piece, arc
+from daemon.loops.path_following import FollowingErrors, FollowingTuning, PathFollower
 
 Case = dict[str, Any]
 

@@ -9,11 +9,7 @@ from dataclasses import dataclass, field
 from itertools import product
 from typing import Final
 
-from daemon.loops.cascade_following import CascadeFollower, CascadeTuning
-from daemon.loops.odometry import Pose
-from daemon.loops.path import Path, Piece
-from daemon.loops.path_following import FollowingStep, FollowingTuning, PathFollower
-from vcan_tests.daemon.semitrailer_plant import (
+from daemon.campaigns.ideal_semitrailer import (
     CIRCLE_BACKWARDS,
     LINE_BACKWARDS,
     SEMITRAILER,
@@ -21,6 +17,10 @@ from vcan_tests.daemon.semitrailer_plant import (
     SemitrailerPlant,
     placed,
 )
+from daemon.loops.cascade_following import CascadeFollower, CascadeTuning
+from daemon.loops.odometry import Pose
+from daemon.loops.path import Path, Piece
+from daemon.loops.path_following import FollowingStep, FollowingTuning, PathFollower
 
 SPEED_M_S: Final = 0.2
 NEAR_M: Final = 0.01
