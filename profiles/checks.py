@@ -14,6 +14,8 @@ from profiles.schema import SCHEMA_VERSION
 
 REFERENCES = {"wheels": "drives", "encoders": "encoders", "brakes": "brakes"}
 """Lists of names, or mappings by name, in ``vehicle`` and the part that defines the names."""
+STEERING = {"drive": "drives", "encoder": "encoders"}
+"""Names in ``vehicle.steering``, likewise."""
 NEEDED = {
     "paired_steer": (
         ("limits", "steering_rim_speed_m_s"),
@@ -21,6 +23,11 @@ NEEDED = {
         ("simulation", "steering_inertia_kg_m2"),
         ("simulation", "steering_friction_n_m"),
         ("simulation", "brake_holding_torque_n_m"),
+    ),
+    "ackermann": (
+        ("limits", "lateral_acceleration_m_s2"),
+        ("simulation", "steering_inertia_kg_m2"),
+        ("simulation", "steering_friction_n_m"),
     ),
     "omni": (("limits", "yaw_rate_deg_s"), ("limits", "yaw_acceleration_deg_s2")),
 }
@@ -104,7 +111,7 @@ def _node_ids(data: dict[str, Any]) -> Iterator[Finding]:
 def _vehicle_names(data: dict[str, Any]) -> Iterator[Finding]:
     for key, kind in REFERENCES.items():
         given = part(data, "vehicle").get(key)
-        names = list(given) if isinstance(given, list | dict) else []
+        names = _names(part(data, "vehicle"), key)
         known = _defined(data, kind)
         for index, name in enumerate(names):
             path = ("vehicle", key, name if isinstance(given, dict) else index)
@@ -112,6 +119,26 @@ def _vehicle_names(data: dict[str, Any]) -> Iterator[Finding]:
                 yield _unknown(path, kind, name, known)
             elif name in names[:index]:
                 yield Finding(path, f"{name!r} stands here twice", f"name each of {kind} once")
+    yield from _steering(data)
+
+
+def _steering(data: dict[str, Any]) -> Iterator[Finding]:
+    vehicle, steering = part(data, "vehicle"), part(part(data, "vehicle"), "steering")
+    for key, kind in STEERING.items():
+        name, path, known = steering.get(key), ("vehicle", "steering", key), _defined(data, kind)
+        if isinstance(name, str) and known is not None and name not in known:
+            yield _unknown(path, kind, name, known)
+    if steering.get("drive") in _names(vehicle, "wheels"):
+        yield Finding(("vehicle", "steering", "drive"), "drives a wheel, too", "give the steering a drive of its own")
+    limit, stop = steering.get("limit_deg"), steering.get("stop_deg")
+    if isinstance(limit, int | float) and isinstance(stop, int | float) and limit >= stop:
+        what = f"is {limit:g} deg, the stops are at {stop:g} deg"
+        yield Finding(("vehicle", "steering", "limit_deg"), what, f"write less than {stop:g}")
+
+
+def _names(vehicle: dict[str, Any], key: str) -> list[Any]:
+    given = vehicle.get(key)
+    return list(given) if isinstance(given, list | dict) else []
 
 
 def _unknown(path: FieldPath, kind: str, name: Any, known: dict[str, Any]) -> Finding:
@@ -186,9 +213,11 @@ def _unused(data: dict[str, Any]) -> Iterator[Finding]:
     vehicle = part(data, "vehicle")
     if not vehicle:
         return
+    steering = part(vehicle, "steering")
+    steered = {kind: steering[key] for key, kind in STEERING.items() if key in steering}
     for key, kind in REFERENCES.items():
-        names = vehicle.get(key)
+        names = [*_names(vehicle, key), steered.get(kind)]
         for name in part(data, kind):
-            if isinstance(names, list | dict) and name not in names:
+            if (key in vehicle or kind in steered) and name not in names:
                 what = f"is not named in vehicle.{key}"
                 yield Finding((kind, name), what, "the vehicle's motions do not use it", warning=True)

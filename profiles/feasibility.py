@@ -16,6 +16,7 @@ import msgspec
 
 from profiles.checks import Finding, part
 from profiles.schema import (
+    CarGeometry,
     DriveConfig,
     EncoderConfig,
     Geometry,
@@ -25,6 +26,7 @@ from profiles.schema import (
     PairedSteerGeometry,
     Part,
     SimulationConfig,
+    SteeredAxle,
 )
 
 GRAVITY_M_S2 = 9.81
@@ -66,6 +68,7 @@ def findings(data: dict[str, Any]) -> Iterator[Finding]:
     encoders = {name: _valid(value, EncoderConfig) for name, value in part(data, "encoders").items()}
     drives = {name: _valid(value, DriveConfig) for name, value in part(data, "drives").items()}
     load = _load(vehicle, simulation)
+    steering = vehicle.steering if isinstance(vehicle, CarGeometry) else None
     if vehicle is not None and data.get("simulation") is None:
         yield Finding(
             ("vehicle",), "no tyre data: ramps are not checked against friction", "add simulation:", warning=True
@@ -73,8 +76,12 @@ def findings(data: dict[str, Any]) -> Iterator[Finding]:
     for name, drive in drives.items():
         if drive is not None:
             supply_v = simulation.supply_voltage_v if simulation else drive.motor.nominal_voltage_v
-            yield from _drive(("drives", name), drive, supply_v, load)
-            yield from _limits_of_drive(limits, drive, name)
+            if steering is not None and name == steering.drive:
+                yield from _drive(("drives", name), drive, supply_v, _steering_load(simulation))
+                yield from _steering_limits(steering, drive, name)
+            else:
+                yield from _drive(("drives", name), drive, supply_v, load)
+                yield from _limits_of_drive(limits, drive, name)
     yield from _limits(limits, vehicle, encoders)
     analog = sum(drive is not None and drive.analog_inputs for drive in drives.values())
     yield from _bus(_valid(data.get("network", {}), Network), len(drives), len(encoders), analog)
@@ -89,8 +96,9 @@ def _valid(value: Any, kind: type[T]) -> T | None:
 
 
 def _vehicle(value: Any) -> Geometry | None:
-    kind = value.get("type") if isinstance(value, dict) else None
-    return _valid(value, OmniGeometry) if kind == OmniGeometry.type else _valid(value, PairedSteerGeometry)
+    kinds: dict[str, type[Geometry]] = {kind.type: kind for kind in (PairedSteerGeometry, OmniGeometry, CarGeometry)}
+    kind = kinds.get(str(value.get("type"))) if isinstance(value, dict) else None
+    return None if kind is None else _valid(value, kind)
 
 
 def _load(vehicle: Geometry | None, simulation: SimulationConfig | None) -> Load | None:
@@ -98,11 +106,22 @@ def _load(vehicle: Geometry | None, simulation: SimulationConfig | None) -> Load
         return None
     share_kg = vehicle.mass_kg / len(vehicle.wheels)
     pushed_kg = OMNI_SHARE * share_kg if isinstance(vehicle, OmniGeometry) else share_kg
-    weight_n = share_kg * GRAVITY_M_S2
+    weight_n = (_driven_kg(vehicle) if isinstance(vehicle, CarGeometry) else share_kg) * GRAVITY_M_S2
     if simulation is None:
         return Load(pushed_kg, weight_n, wheel_inertia_kg_m2=0.0, friction=math.inf, rolling_resistance=0.0)
     tyre = simulation.tyre
     return Load(pushed_kg, weight_n, simulation.wheel_inertia_kg_m2, tyre.friction, tyre.rolling_resistance)
+
+
+def _driven_kg(vehicle: CarGeometry) -> float:
+    """Mass that stands on one of the two rear wheels."""
+    return vehicle.mass_kg * (1.0 - vehicle.mass_offset_m / vehicle.wheelbase_m) / len(vehicle.wheels)
+
+
+def _steering_load(simulation: SimulationConfig | None) -> Load:
+    """A steered axle on its own: nothing that it pushes, nothing that slips."""
+    inertia = simulation.steering_inertia_kg_m2 if simulation else 0.0
+    return Load(0.0, 0.0, inertia, friction=math.inf, rolling_resistance=0.0)
 
 
 def max_speed_m_s(drive: DriveConfig, supply_v: float) -> float:
@@ -147,7 +166,7 @@ def max_deceleration_m_s2(drive: DriveConfig, load: Load) -> float:
 
 def _by_friction_m_s2(load: Load) -> float:
     """What friction holds: mu g where each wheel pushes its own share of the mass, which then cancels out."""
-    return load.friction * load.weight_n / load.mass_kg
+    return load.friction * load.weight_n / load.mass_kg if load.mass_kg > 0 else math.inf
 
 
 def _drive(path: tuple[str, str], drive: DriveConfig, supply_v: float, load: Load | None) -> Iterator[Finding]:
@@ -175,6 +194,14 @@ def _limits_of_drive(limits: Limits | None, drive: DriveConfig, name: str) -> It
     yield from _at_most(path, limits.acceleration_m_s2, drive.acceleration_m_s2, "m/s^2", f"drive {name} allows")
 
 
+def _steering_limits(steering: SteeredAxle, drive: DriveConfig, name: str) -> Iterator[Finding]:
+    arm_m, reason = drive.wheel_radius_m, f"drive {name} allows"
+    rate, ramp = math.degrees(drive.max_speed_m_s / arm_m), math.degrees(drive.acceleration_m_s2 / arm_m)
+    yield from _at_most(("vehicle", "steering", "rate_deg_s"), steering.rate_deg_s, rate, "deg/s", reason)
+    path = ("vehicle", "steering", "acceleration_deg_s2")
+    yield from _at_most(path, steering.acceleration_deg_s2, ramp, "deg/s^2", reason)
+
+
 def _limits(
     limits: Limits | None, vehicle: Geometry | None, encoders: dict[str, EncoderConfig | None]
 ) -> Iterator[Finding]:
@@ -184,6 +211,7 @@ def _limits(
     yield from _at_most(("limits", "speed_m_s"), limits.speed_m_s, wheel_m_s, "m/s", "the wheels' limit is")
     if isinstance(vehicle, OmniGeometry):
         yield from _omni_limits(limits, vehicle)
+    if isinstance(vehicle, OmniGeometry | CarGeometry):
         return
     path = ("limits", "steering_rim_speed_m_s")
     yield from _at_most(path, limits.steering_rim_speed_m_s, wheel_m_s, "m/s", "the wheels' limit is")

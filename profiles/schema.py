@@ -92,6 +92,15 @@ class Gains(Part, frozen=True, kw_only=True):
     """Object 0x60FB/3."""
 
 
+class EmergencyStopConfig(Part, frozen=True, kw_only=True):
+    """An emergency stop contact at a digital input of a drive."""
+
+    input: Annotated[int, Meta(ge=1, le=6)]
+    """Number of the digital input."""
+    pressed: Literal["low", "high"] = "low"
+    """Level of the input while it is pressed; with low, a contact that opens, a broken wire counts as pressed too."""
+
+
 class DriveConfig(Part, frozen=True, kw_only=True):
     """One drive with its motor, gear, encoder and wheel."""
 
@@ -128,6 +137,8 @@ class DriveConfig(Part, frozen=True, kw_only=True):
     """Regulator gains; None: as they are in the drive."""
     analog_inputs: bool = False
     """Whether the drive tells the voltages at its analog inputs 1 and 2 in each cycle (TPDO2)."""
+    emergency_stop: EmergencyStopConfig | None = None
+    """A contact that stops the whole vehicle."""
 
     @property
     def qc_per_motor_turn(self) -> int:
@@ -232,7 +243,41 @@ class OmniGeometry(Part, frozen=True, kw_only=True, tag_field="type", tag="omni"
     """By the names of their drives, in the order of the loops."""
 
 
-Geometry = PairedSteerGeometry | OmniGeometry
+class SteeredAxle(Part, frozen=True, kw_only=True):
+    """An axle whose wheels a motor of its own steers, also while they roll."""
+
+    drive: str
+    """Name of the drive that turns it. Its wheel radius is the arm at which its speeds and ramps count."""
+    encoder: str
+    """Name of the encoder that tells its angle."""
+    limit_deg: Annotated[float, Meta(gt=0, lt=90)]
+    """Steering angle that commands may ask for, to each side."""
+    stop_deg: Annotated[float, Meta(gt=0, lt=90)]
+    """Steering stops."""
+    rate_deg_s: Positive
+    acceleration_deg_s2: Positive
+
+
+class CarGeometry(Part, frozen=True, kw_only=True, tag_field="type", tag="ackermann"):
+    """Geometry and body of a car with front-wheel steering and two driven rear wheels (ENPM808X report, section 4)."""
+
+    type: ClassVar[str] = "ackermann"
+    mass_kg: Positive
+    yaw_inertia_kg_m2: Positive
+    centre_of_mass_height_m: NotNegative = 0.0
+    wheelbase_m: Positive
+    """L: distance between the axles."""
+    track_m: Positive
+    """W: distance between the wheels of an axle."""
+    mass_offset_m: NotNegative
+    """a: of the centre of mass forward of the rear axle."""
+    wheels: tuple[str, str]
+    """Names of the drives of the rear wheels: left, right."""
+    steering: SteeredAxle
+    """The front axle; its angle is that of a wheel between the two front ones (gamma)."""
+
+
+Geometry = PairedSteerGeometry | OmniGeometry | CarGeometry
 
 
 class Limits(Part, frozen=True, kw_only=True):
@@ -252,6 +297,8 @@ class Limits(Part, frozen=True, kw_only=True):
     yaw_rate_deg_s: Positive = 45.0
     """Rate of turn of a vehicle that can turn on the spot."""
     yaw_acceleration_deg_s2: Positive = 45.0
+    lateral_acceleration_m_s2: Positive = 2.0
+    """Of a vehicle that steers while it rolls; the faster it goes, the less it steers."""
 
 
 class Tyre(Part, frozen=True, kw_only=True):
