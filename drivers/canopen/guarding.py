@@ -1,12 +1,16 @@
 """Node guarding (CiA 301 7.2.8.3.2.1), paced by the control cycle: a cycle that hangs guards nobody.
 
-A node is asked once a guard time. An answer that is missing is asked for again after :data:`REPEAT_AFTER` of the guard
-time; two unanswered requests within :data:`LOST_AFTER` of it mean that the node is lost. So a node that dies right
-after an answer is known to be lost before two guard times are over.
+A node is asked once a guard time, and all nodes in the same cycle: when their master dies, the drives of a vehicle then
+find it out together. Else the first would brake, at the limit of their current, against those that still drive.
+
+An answer that is missing is asked for again after :data:`REPEAT_AFTER` of the guard time; two unanswered requests
+within :data:`LOST_AFTER` of it mean that the node is lost. So a node that dies right after an answer is known to be
+lost before two guard times are over.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from drivers.bus.contract import RTR_FLAG
@@ -92,7 +96,7 @@ class Guard:
 
     def _ask(self, now_s: float) -> None:
         self._asked_s = now_s
-        self._next_s = now_s + self.guard_time_s
+        self._next_s = (math.floor(now_s / self.guard_time_s + EARLY) + 1) * self.guard_time_s
         self._repeated = False
         self._request(RTR_FLAG | ERROR_CONTROL_COB_ID + self.node)
 

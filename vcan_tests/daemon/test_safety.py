@@ -240,3 +240,16 @@ async def test_the_second_brake_is_not_released_where_a_drive_was_enabled_while_
         assert [brake.state for brake in robot.app.devices.brakes.values()].count(BrakeState.ENGAGED) == 1
         assert not isinstance(await enabling, CanhelmError)
         await robot.call("motor.disable", node="rear_left")
+
+
+@pytest.mark.parametrize("seed", range(3))
+async def test_a_robot_whose_daemon_dies_stands_after_the_life_time_and_its_quick_stop_ramp(seed: int) -> None:
+    async with running_robot(seed=seed, expect_errors=True) as robot:
+        network, drives = robot.app.profile.network, robot.app.profile.drives.values()
+        driving = _begin(robot, "drive.parallel", angle_deg=0.0, speed_m_s=0.5, duration_s=60.0)
+        await robot.until(lambda: robot.speed_m_s > 0.49)
+        await robot.app.bus.close()
+        ramp_s = 0.5 / min(drive.quick_stop_m_s2 for drive in drives)
+        await asyncio.sleep(1e-3 * network.guard_time_ms * network.life_time_factor + ramp_s + 0.05)
+        assert robot.fastest_wheel_m_s < 0.01
+        await driving

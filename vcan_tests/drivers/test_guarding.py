@@ -15,12 +15,12 @@ from vcan_tests.drivers.bench import bench
 class Watch:
     """A guard of node 3 with a guard time of 100 ms, called every 10 ms."""
 
-    def __init__(self) -> None:
+    def __init__(self, armed_s: float = 0.0) -> None:
         self.requests: list[float] = []
         self.lost_after: list[float] = []
-        self.now_s = 0.0
+        self.now_s = armed_s
         self.guard = Guard(3, 0.1, self._request, self.lost_after.append)
-        self.guard.arm(0.0)
+        self.guard.arm(armed_s)
 
     def _request(self, can_id: int) -> None:
         assert can_id == RTR_FLAG | 0x703
@@ -37,7 +37,16 @@ def test_a_node_that_answers_is_asked_once_a_guard_time() -> None:
     for cycle in range(5):
         watch.run(0.01 + 0.1 * cycle)
         watch.guard.answer(cycle % 2, watch.now_s)
-    assert watch.requests == [0.01, 0.11, 0.21, 0.31, 0.41]
+    assert watch.requests == [0.01, 0.1, 0.2, 0.3, 0.4]
+
+
+def test_nodes_that_booted_one_after_the_other_are_asked_in_the_same_cycle() -> None:
+    first, second = Watch(), Watch(armed_s=0.23)
+    for watch in (first, second):
+        for cycle in range(6):
+            watch.run(0.1 * cycle + 0.05)
+            watch.guard.answer(cycle % 2, watch.now_s)
+    assert first.requests[-2:] == second.requests[-2:]
 
 
 def test_a_node_that_dies_after_an_answer_is_lost_within_two_guard_times() -> None:
@@ -45,8 +54,8 @@ def test_a_node_that_dies_after_an_answer_is_lost_within_two_guard_times() -> No
     watch.run(0.01)
     watch.guard.answer(0, watch.now_s)
     watch.run(1.0)
-    assert watch.requests == [0.01, 0.11, 0.15]
-    assert watch.lost_after == [pytest.approx(0.18)]
+    assert watch.requests == [0.01, 0.1, 0.15]
+    assert watch.lost_after == [pytest.approx(0.17)]
 
 
 def test_an_answer_to_the_repeated_request_is_good() -> None:
