@@ -29,8 +29,9 @@ test: lint ## style, types, import rules, then all tests
 vcan-test: $(VENV)/.stamp-test ## the tests on a kernel's CAN bus and under a real systemd, both booted if need be
 	$(VENV)/bin/python -m vcan_tests.kernel.suite $(ARGS)
 
-vcan-figures: $(VENV)/.stamp-test ## measure on a kernel's CAN bus: stops without a daemon, SYNC's period, tshark's verdict
+vcan-figures: $(VENV)/.stamp-test ## measure there: stops without a daemon, period of SYNC, what tshark says, a life of the service
 	$(VENV)/bin/python -m vcan_tests.vcan.figures
+	$(VENV)/bin/python -m vcan_tests.systemd.figures
 
 install: | $(VENV)/bin/pip ## the service on this machine (as root): /opt/canhelm, units, users; see docs/service.md
 	$(PACKAGING) packaging/install.sh

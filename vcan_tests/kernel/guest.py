@@ -23,6 +23,8 @@ from vcan_tests.kernel.processes import run_to_end
 TIMED_OUT = 124
 NO_STATUS = 125
 SCRIPTS = Path(__file__).parent
+SYSTEMD_GUEST = (Path("/run/systemd/system"), Path("/run/guest/command"))
+"""What is there in a guest with a systemd, and together nowhere else."""
 PASSED_ON = ("HOME", "LANG", "LC_ALL", "LOGNAME", "PYTEST_ADDOPTS", "USER")
 
 
@@ -64,6 +66,11 @@ def run_in_guest(
     release = exchange / "kernel"
     status = TIMED_OUT if ended is None else _status(exchange)
     return Outcome(status, release.read_text().strip() if release.exists() else "that did not start")
+
+
+def is_guest() -> bool:
+    """Whether this process runs in a guest, under a systemd that is not this machine's."""
+    return all(path.exists() for path in SYSTEMD_GUEST)
 
 
 @contextmanager

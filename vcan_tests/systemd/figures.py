@@ -1,6 +1,6 @@
-"""What the service's documentation shows: the journal of one life, and the times of a clean-up.
+"""The second part of ``make vcan-figures``: the journal of one life of the service, and the times of a clean-up.
 
-In the guest: ``python -m vcan_tests.kernel --systemd -- .venv/bin/python -m vcan_tests.systemd.figures``.
+It boots a guest for that: what it installs and kills is never this machine's.
 """
 
 from __future__ import annotations
@@ -14,8 +14,13 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from vcan_tests.kernel.guest import exchange_folder, is_guest, run_in_guest
+from vcan_tests.kernel.suite import build_package
+from vcan_tests.kernel.tools import require_tools
 from vcan_tests.systemd.bench import PATIENT, PROFILE, SERVICE, Journal, Robot, Witness, told, until
 
+MODULE = "vcan_tests.systemd.figures"
+LONGEST_S = 600.0
 FRONT_LEFT = 3
 """The drive that carries the front brake on its output."""
 BRAKE_OUTPUT = 1 << 12
@@ -82,7 +87,18 @@ async def clean_up_of_a_turning_pair(robot: Robot, folder: Path) -> CleanUp:
     return CleanUp(*(moment_s - killed_s for moment_s in (told_to_stop_s, engaged_s, off_s, ready_s)))
 
 
-async def main() -> None:
+def main() -> int:
+    """Measure in a guest; zero when all could be measured."""
+    if is_guest():
+        asyncio.run(_measure())
+        return 0
+    require_tools()
+    build_package()
+    with exchange_folder() as exchange:
+        return run_in_guest([sys.executable, "-m", MODULE], exchange, systemd=True, timeout_s=LONGEST_S).status
+
+
+async def _measure() -> None:
     """Print it all."""
     robot = Robot()
     journal = await one_life(robot)
@@ -99,4 +115,4 @@ async def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(asyncio.run(main()))
+    sys.exit(main())

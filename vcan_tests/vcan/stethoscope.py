@@ -81,6 +81,19 @@ def at_rest_after(frames: Sequence[Frame], node: int, since_s: float) -> float:
     return standing_since_s - since_s
 
 
+def life_time_s(frames: Sequence[Frame], node: int, missed_s: float) -> float:
+    """Time from a drive's last guarding answer to its emergency message [s]: its life time, and what its twin is late.
+
+    Args:
+        frames: of the whole time.
+        node: the drive.
+        missed_s: when it sent the message.
+    """
+    return missed_s - max(
+        frame.time_s for frame in frames if frame.can_id == 0x700 + node and frame.data and frame.time_s < missed_s
+    )
+
+
 def emergencies_after(frames: Sequence[Frame], node: int, since_s: float) -> list[tuple[int, float]]:
     """Codes of a node's emergency messages from then on, and the time from then to each [s]."""
     return [
