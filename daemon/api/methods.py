@@ -14,6 +14,7 @@ _TIME = Param("duration_s", "number", "until stopped where left out", "s", defau
 _SPEED = Param("speed_m_s", "number", "speed of the robot's centre; negative drives backward", "m/s")
 _BRAKES = Param("pair", "string", "front, rear or all", default="all")
 _OBJECT = Param("object", "string", "name, 0x6041, or 0x2078/1")
+_KEPT = Param("kept", "string", "where path.add keeps the first pieces", default=None)
 _MOTION = Param("motion", "string", "id of the motion")
 
 
@@ -164,6 +165,13 @@ _VEHICLE = (
         needs_lease=True,
     ),
     Method(
+        "drive.heading",
+        "Steer to a heading of the frame that began with the daemon, and drive at a speed.",
+        (Param("heading_deg", "number", "counter-clockwise positive", "deg"), _SPEED, _DURATION, _WAIT),
+        "motion, x_m, y_m, heading_deg, heading_error_deg, duration_s",
+        needs_lease=True,
+    ),
+    Method(
         "drive.rotate",
         "Turn about the own centre.",
         (Param("rate_deg_s", "number", "yaw rate", "deg/s"), _TIME, _WAIT),
@@ -199,6 +207,33 @@ _VEHICLE = (
         ),
         "motion, result, x_m, y_m, heading_deg, duration_s, error_m, heading_error_deg, least_safety_factor",
         needs_lease=True,
+    ),
+    Method(
+        "drive.path",
+        "Follow a path of lines and arcs.",
+        (
+            Param("path", "object", "start and pieces, as in a path file"),
+            _KEPT,
+            Param("backward", "boolean", "exchange forward and backward", default=False),
+            Param("speed_m_s", "number", "no faster than; as fast as it may where left out", "m/s", None, 0.001),
+            Param(
+                "law",
+                "string",
+                "the better one, or that of the semi-trailer thesis, for vehicles that have both",
+                default="cascade",
+                choices=("cascade", "published"),
+            ),
+            Param("dry_run", "boolean", "only check the path, and tell how it would be driven", default=False),
+            _WAIT,
+        ),
+        "motion, length_m, sections, duration_s, end, largest_error_m",
+        needs_lease=True,
+    ),
+    Method(
+        "path.add",
+        "Keep pieces of a path that is too long for one request, for a drive.path to come.",
+        (Param("pieces", "list", "as in a path file"), _KEPT),
+        "kept, pieces",
     ),
     Method(
         "drive.set",
@@ -240,6 +275,16 @@ _NETWORK = (
         "Switch the supply of a simulated node.",
         (Param("node", "node", "node id, name, or all"), Param("on", "boolean", "on or off")),
         "node, on",
+    ),
+    Method(
+        "simulation.input",
+        "Apply a level to a digital input of a simulated drive.",
+        (
+            _NODE,
+            Param("input", "integer", "number of the digital input", minimum=1, maximum=6),
+            Param("level", "string", "what is applied", choices=("low", "high")),
+        ),
+        "node, input, level",
     ),
 )
 

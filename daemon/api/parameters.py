@@ -32,7 +32,7 @@ class Param:
     Attributes:
         name: with its unit as suffix.
         type: ``number``, ``integer``, ``boolean``, ``string``, ``node`` (id 1 to 127, or a name), ``value``
-            (a number or a string) or ``values`` (whole numbers by object).
+            (a number or a string), ``values`` (whole numbers by object), ``object`` or ``list``.
         doc: what it means.
         unit: its unit, empty for none.
         default: value where it is left out; a parameter without one is required.
@@ -199,4 +199,6 @@ _TYPES: dict[str, tuple[Callable[[Any], bool], str]] = {
     "node": (_is_node, "a node id from 1 to 127, or a name"),
     "values": (_is_settings, f"at most {MAX_SETTINGS} whole numbers by object"),
     "value": (lambda value: _is_number(value) or _is_text(value), "a number or a string"),
+    "object": (lambda value: isinstance(value, dict), "an object"),
+    "list": (lambda value: isinstance(value, list), "a list"),
 }

@@ -57,6 +57,33 @@ def turn(
 
 
 @app.command
+def heading(
+    heading_deg: float,
+    /,
+    *,
+    speed: float,
+    duration: float,
+    no_wait: NoWait = False,
+    options: Options = DEFAULT,
+) -> int:
+    """Steer to a heading while driving, on vehicles that can.
+
+    Example: `canhelm drive heading 45 --speed 1 --duration 4`
+
+    Parameters
+    ----------
+    heading_deg: float
+        Degrees, counter-clockwise positive; 0 is where the vehicle pointed when the daemon began.
+    speed: float
+        m/s.
+    duration: float
+        Seconds, until the vehicle begins to slow down.
+    """
+    params = {"heading_deg": heading_deg, "speed_m_s": speed, "duration_s": duration}
+    return run_motion(options, "drive.heading", no_wait=no_wait, **params)
+
+
+@app.command
 def rotate(
     rate_deg_s: float,
     /,
@@ -121,3 +148,43 @@ def to(
         "planner": "published" if published else "optimal",
     }
     return run_motion(options, "drive.to", no_wait=no_wait, **params)
+
+
+@app.command
+def path(
+    file: str,
+    /,
+    *,
+    backward: Annotated[bool, Parameter(negative=())] = False,
+    speed: float | None = None,
+    published: Annotated[bool, Parameter(negative=())] = False,
+    dry_run: Annotated[bool, Parameter(negative=())] = False,
+    no_wait: NoWait = False,
+    options: Options = DEFAULT,
+) -> int:
+    """Follow a path of lines and arcs, on vehicles that can.
+
+    Example: `canhelm drive path circle --backward`
+
+    Parameters
+    ----------
+    file: str
+        A path file (docs/paths.md), or a shipped one: line, circle, eight, reverse, park-parallel, park-perpendicular.
+    backward: bool
+        Drive backward what the file says is driven forward, and the other way round.
+    speed: float
+        m/s, no faster than this.
+    published: bool
+        By the law of the semi-trailer thesis, put right, for comparison.
+    dry_run: bool
+        Only check the path, and tell how it would be driven.
+    """
+    from daemon.cli.path_sending import drive_path
+
+    params = {
+        "backward": backward,
+        "speed_m_s": speed,
+        "law": "published" if published else "cascade",
+        "dry_run": dry_run,
+    }
+    return drive_path(options, file, no_wait=no_wait, **params)

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Final, NamedTuple
 
 from canhelm.errors import LimitExceeded, UsageError
@@ -135,7 +134,7 @@ class Path:
         sections: first and last piece of each section.
     """
 
-    def __init__(self, pieces: Sequence[Piece], lead_m: float = 0.0) -> None:
+    def __init__(self, pieces: Iterable[Piece], lead_m: float = 0.0) -> None:
         """Check that the pieces join.
 
         Args:
@@ -147,17 +146,30 @@ class Path:
             UsageError: there is no piece, one has a number that is not finite or no length, or does not begin where
                 the one before it ends; ``object`` names the piece.
         """
-        if not pieces:
+        self.pieces: Final[list[Piece]] = []
+        self.sections: Final[list[tuple[int, int]]] = []
+        self._begin_m: Final[list[float]] = []
+        self._lead_m = lead_m
+        for piece in pieces:
+            self.append(piece)
+        if not self.pieces:
             raise UsageError("the path is empty", remedy="give it at least one line or arc")
-        self.pieces: Final = tuple(pieces)
-        last = len(self.pieces) - 1
-        for number, piece in enumerate(self.pieces):
-            _check_numbers(number, piece, number == last)
-        for number, (before, piece) in enumerate(pairwise(self.pieces), start=1):
-            _check_joint(number, before, piece, lead_m)
-        turns = [i for i, (a, b) in enumerate(pairwise(self.pieces), start=1) if a.backward != b.backward]
-        self.sections: Final = tuple(zip([0, *turns], [turn - 1 for turn in turns] + [last], strict=True))
-        self._begin_m: Final = _begins(self.pieces)
+
+    def append(self, piece: Piece) -> None:
+        """Let the path go on by a piece. Raises UsageError as the constructor does."""
+        number = len(self.pieces)
+        _check_numbers(number, piece)
+        if number:
+            before = self.pieces[-1]
+            if before.length_m == math.inf:
+                raise _not_finite(number - 1)
+            _check_joint(number, before, piece, self._lead_m)
+        if number and before.backward == piece.backward:
+            self.sections[-1] = (self.sections[-1][0], number)
+        else:
+            self.sections.append((number, number))
+        self._begin_m.append(self._begin_m[-1] + before.length_m if number else 0.0)
+        self.pieces.append(piece)
 
     def section_length(self, section: int) -> float:
         """Length of a section [m]."""
@@ -190,22 +202,18 @@ class Path:
         return self.pieces[number], at - self._begin_m[number]
 
 
-def _begins(pieces: Sequence[Piece]) -> list[float]:
-    begins = [0.0]
-    for piece in pieces[:-1]:
-        begins.append(begins[-1] + piece.length_m)
-    return begins
-
-
-def _check_numbers(number: int, piece: Piece, may_be_endless: bool) -> None:
+def _check_numbers(number: int, piece: Piece) -> None:
     numbers = (piece.x_m, piece.y_m, piece.direction_rad, piece.curvature)
-    endless = piece.length_m == math.inf and may_be_endless
-    if not all(map(math.isfinite, numbers)) or not (endless or math.isfinite(piece.length_m)):
-        raise UsageError(f"piece {number} has a number that is not finite", object=f"piece {number}")
+    if not all(map(math.isfinite, numbers)) or math.isnan(piece.length_m):
+        raise _not_finite(number)
     if piece.length_m <= 0:
         raise UsageError(
             f"piece {number} is {piece.length_m:g} m long", object=f"piece {number}", remedy="leave the piece out"
         )
+
+
+def _not_finite(number: int) -> UsageError:
+    return UsageError(f"piece {number} has a number that is not finite", object=f"piece {number}")
 
 
 def _check_joint(number: int, before: Piece, piece: Piece, lead_m: float) -> None:

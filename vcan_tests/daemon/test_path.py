@@ -115,14 +115,14 @@ def test_waypoints_give_lines_and_rounded_corners() -> None:
 def test_a_leg_back_along_the_last_one_changes_the_driving_direction() -> None:
     path = join_waypoints([(0, 0), (2, 0), (-1, 0), (-1, 2)], 0.5, lead_m=0.6)
     assert [piece.backward for piece in path.pieces] == [False, True, True, True]
-    assert path.sections == ((0, 0), (1, 3))
+    assert path.sections == [(0, 0), (1, 3)]
     assert path.pieces[1].point(0) == pytest.approx((1.4, 0)), "the trailer's axle is behind the truck's"
 
 
 def test_forwards_again_begins_at_the_trucks_axle() -> None:
     path = join_waypoints([(0, 0), (-2, 0), (1, 0)], 0.5, backward=True, lead_m=0.6)
     assert path.pieces[1].point(0) == pytest.approx((-1.4, 0))
-    assert path.sections == ((0, 0), (1, 1))
+    assert path.sections == [(0, 0), (1, 1)]
 
 
 def test_legs_too_short_for_their_corners_are_named() -> None:

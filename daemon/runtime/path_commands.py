@@ -1,0 +1,126 @@
+"""``drive.path``: from what a client sends to a motion of a vehicle that can follow paths."""
+
+from __future__ import annotations
+
+import itertools
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar, runtime_checkable
+
+import msgspec
+
+from canhelm.errors import LimitExceeded, Refused, UsageError
+from daemon.runtime.handlers import Handler, Params, holder, run_motion
+from daemon.runtime.motions import Motion
+from daemon.runtime.supervisor import Supervisor
+from profiles.path_file import MAX_PIECES, PathSpec, PieceSpec
+
+MAX_KEPT = 4
+"""Paths that are kept for clients which send them in parts; a fifth one takes the oldest one's place."""
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class PathRequest:
+    """What a client wants to be driven.
+
+    Attributes:
+        spec: start and pieces, as in a path file.
+        backward: what the file says is driven forward is driven backward, and the other way round.
+        speed_m_s: no faster than; None: as fast as the vehicle may.
+        law: ``cascade`` or ``published``, for vehicles that have both.
+    """
+
+    spec: PathSpec
+    backward: bool = False
+    speed_m_s: float | None = None
+    law: str = "cascade"
+
+
+class PathPlan(ABC):
+    """A path that one vehicle can follow, from where it is now."""
+
+    @abstractmethod
+    def summary(self) -> dict[str, Any]:
+        """What would be driven, for ``dry_run``; part of the motion's result, too."""
+
+    @abstractmethod
+    def motion(self, lease: str | None) -> Motion:
+        """The motion that drives it. Raises Refused where the vehicle is not at its beginning."""
+
+
+@runtime_checkable
+class PathVehicle(Protocol):
+    """A vehicle that follows paths; ``drive.path`` is one of its methods."""
+
+    async def plan_path(self, request: PathRequest) -> PathPlan:
+        """Check a path and prepare it; a long one in slices between which the control cycle runs.
+
+        Raises:
+            UsageError: it is empty, or its pieces do not join; ``object`` is ``pieces[number]``.
+            LimitExceeded: a piece is more than the vehicle can do; likewise.
+        """
+        ...
+
+
+class PathCommands:
+    """The methods ``drive.path`` and ``path.add``, by name in :attr:`handlers`.
+
+    Args:
+        supervisor: what decides.
+        vehicle: its vehicle.
+    """
+
+    def __init__(self, supervisor: Supervisor, vehicle: PathVehicle) -> None:
+        self._supervisor, self._vehicle = supervisor, vehicle
+        self._kept: dict[str, list[PieceSpec]] = {}
+        self._numbers = itertools.count(1)
+        self.handlers: dict[str, Handler] = {"drive.path": self._drive, "path.add": self._add}
+
+    async def _add(self, params: Params, lease: str | None) -> dict[str, Any]:
+        """Keep pieces of a path that is too long for one request."""
+        pieces = converted(params["pieces"], list[PieceSpec])
+        name = params["kept"]
+        if name is None:
+            name = str(next(self._numbers))
+            if len(self._kept) == MAX_KEPT:
+                del self._kept[next(iter(self._kept))]
+            self._kept[name] = []
+        kept = self._known(name)
+        if len(kept) + len(pieces) > MAX_PIECES:
+            raise LimitExceeded(
+                f"a path of more than {MAX_PIECES} pieces", limit=MAX_PIECES, remedy="drive it in parts"
+            )
+        kept += pieces
+        return {"kept": name, "pieces": len(kept)}
+
+    def _known(self, name: str) -> list[PieceSpec]:
+        if name not in self._kept:
+            raise UsageError(f"no pieces are kept as {name!r}", value=name, remedy="send them again by path.add")
+        return self._kept[name]
+
+    async def _drive(self, params: Params, lease: str | None) -> dict[str, Any]:
+        spec = converted(params["path"], PathSpec)
+        if params["kept"] is not None:
+            kept = self._known(params["kept"])
+            spec = msgspec.structs.replace(spec, pieces=[*kept, *spec.pieces])
+        self._supervisor.require_ready(())
+        request = PathRequest(spec, params["backward"], params["speed_m_s"], params["law"])
+        plan = await self._vehicle.plan_path(request)
+        if params["dry_run"]:
+            return plan.summary()
+        if self._supervisor.motions:
+            raise Refused("the vehicle moves already", remedy="wait for it, or `canhelm stop`")
+        self._kept.pop(params["kept"], None)
+        return await run_motion(self._supervisor, plan.motion(holder(params, lease)), params)
+
+
+def converted(data: Any, kind: type[T]) -> T:
+    """What a client sent as an object. Raises UsageError, with the place of the mistake as ``object``."""
+    try:
+        return msgspec.convert(data, kind)
+    except msgspec.ValidationError as error:
+        what, _, place = str(error).partition(" - at `$")
+        where = place.strip("`.")
+        remedy = "docs/paths.md has the keys of a path"
+        raise UsageError(f"{where or 'path'}: {what}", object=where or None, remedy=remedy) from None

@@ -1,0 +1,201 @@
+"""Path files: what a path to be driven looks like in YAML, and reading one with the lines that its pieces stand in.
+
+A path is a list of pieces, each a line, an arc or a way through points. ``docs/paths.md`` is for people. Where a piece
+begins nothing is said as a rule: where the one before it ends. The same structure, as JSON, goes over the socket.
+"""
+
+from __future__ import annotations
+
+import gc
+import math
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+import msgspec
+import yaml
+from msgspec import Meta
+
+from canhelm.errors import CanhelmError, UsageError
+from profiles.parts import Part, Positive
+
+SHIPPED = Path(__file__).resolve().parent / "paths"
+MAX_PIECES = 200_000
+MAX_FILE_BYTES = 20_000_000
+MAX_WAYPOINTS = 500
+_MAX_DEPTH = 6
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_PIECE = re.compile(r"pieces\[(\d+)\]")
+
+Point = tuple[float, float]
+E = TypeVar("E", bound=CanhelmError)
+
+
+class StartSpec(Part, frozen=True, kw_only=True):
+    """Where a path begins, in the frame that began with the daemon."""
+
+    x_m: float = 0.0
+    y_m: float = 0.0
+    heading_deg: float = 0.0
+    """Of the vehicle, counter-clockwise positive."""
+
+
+class PieceSpec(Part, frozen=True, kw_only=True, omit_defaults=True):
+    """One piece: exactly one of ``line_m``, ``line_to_m``, ``arc_deg`` and ``waypoints_m``."""
+
+    line_m: Positive | None = None
+    """Length of a line straight on."""
+    line_to_m: Point | None = None
+    """End of a line."""
+    arc_deg: float | None = None
+    """By how much the heading turns on an arc, counter-clockwise positive; with ``radius_m`` or ``centre_m``."""
+    waypoints_m: Annotated[list[Point], Meta(min_length=1, max_length=MAX_WAYPOINTS)] | None = None
+    """Points to drive through on straight legs, the corners rounded with ``radius_m``."""
+    radius_m: Positive | None = None
+    centre_m: Point | None = None
+    from_m: Point | None = None
+    """Where it begins; left out: where the one before it ends."""
+    drive: Literal["forward", "backward"] | None = None
+    """Driving direction from this piece on; the first piece is driven forward where nothing is said."""
+
+
+class PathSpec(Part, frozen=True, kw_only=True, omit_defaults=True):
+    """A path."""
+
+    description: str = ""
+    start: StartSpec | None = None
+    """Left out: where the vehicle is when it begins to drive."""
+    pieces: Annotated[list[PieceSpec], Meta(max_length=MAX_PIECES)]
+
+
+@dataclass(frozen=True, slots=True)
+class PathFile:
+    """A path that was read.
+
+    Attributes:
+        file: where from.
+        spec: what it says.
+        lines: of the pieces.
+    """
+
+    file: Path
+    spec: PathSpec
+    lines: list[int]
+
+    def located(self, error: E) -> E:
+        """The same error; one that names ``pieces[3]`` as its object says file and line, too."""
+        piece = _PIECE.fullmatch(error.object or "")
+        if piece is None or int(piece[1]) >= len(self.lines):
+            return error
+        where = f"{self.file}:{self.lines[int(piece[1])]}"
+        return type(error)(
+            f"{where}: {error.message}", object=error.object, value=error.value, limit=error.limit, remedy=error.remedy
+        )
+
+
+def find_path_file(name_or_path: str | Path) -> Path:
+    """The file of a path: a path as it is, a name among the shipped ones. Raises UsageError."""
+    text = str(name_or_path)
+    if os.path.isfile(text):
+        return Path(text)
+    shipped = SHIPPED / f"{text}.yaml"
+    if shipped.is_file() and "/" not in text:
+        return shipped
+    known = ", ".join(sorted(path.stem for path in SHIPPED.glob("*.yaml")))
+    raise UsageError(f"there is no path file {text}", value=text, remedy=f"check it, or name a shipped one: {known}")
+
+
+def load_path_file(name_or_path: str | Path) -> PathFile:
+    """Read a path file.
+
+    Args:
+        name_or_path: a YAML file, or the name of a shipped one.
+
+    Raises:
+        UsageError: there is none, or it has a mistake; the message has file:line.
+    """
+    file = find_path_file(name_or_path)
+    with _no_collection():
+        root = _composed(file)
+        lines = _piece_lines(root)
+        try:
+            data = _plain(root, 0)
+        except RecursionError:
+            raise _mistake(file, 1, "is nested too deeply", "give a mapping with a list of pieces") from None
+        try:
+            spec = msgspec.convert(data, PathSpec)
+        except msgspec.ValidationError as error:
+            what, _, place = str(error).partition(" - at `$")
+            piece = _PIECE.search(place)
+            line = lines[int(piece[1])] if piece and int(piece[1]) < len(lines) else 1
+            text = what.replace("`", "").replace("Object contains", "has an").replace("Object missing", "has no")
+            where = place.strip("`.") or "the file"
+            raise _mistake(file, line, f"{where}: {text}", "docs/paths.md has the keys of a path file") from None
+    if not spec.pieces:
+        raise _mistake(file, 1, "the path is empty", "give it at least one line or arc under pieces:")
+    return PathFile(file, spec, lines)
+
+
+@contextmanager
+def _no_collection() -> Iterator[None]:
+    """A long path is a million small objects, none of them garbage: looking for it would double the time."""
+    was = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was:
+            gc.enable()
+
+
+def _mistake(file: Path, line: int, what: str, remedy: str) -> UsageError:
+    return UsageError(f"{file}:{line}: {what}", value=str(file), remedy=remedy)
+
+
+def _composed(file: Path) -> yaml.Node:
+    try:
+        if file.stat().st_size > MAX_FILE_BYTES:
+            raise _mistake(file, 1, f"is larger than {MAX_FILE_BYTES / 1e6:g} MB", "drive it in parts")
+        root: yaml.Node | None = yaml.compose(file.read_text("utf-8-sig"), Loader=_LOADER)
+    except OSError as error:
+        raise _mistake(file, 1, f"cannot be read ({error.strerror})", "check its permissions") from None
+    except UnicodeDecodeError:
+        raise _mistake(file, 1, "is not UTF-8 text", "save the file as UTF-8") from None
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        what = f"YAML: {error.problem or error.context}"
+        raise _mistake(file, mark.line + 1 if mark else 1, what, "mend the syntax") from None
+    except yaml.YAMLError:
+        raise _mistake(file, 1, "YAML: it has a character that is not allowed", "remove it") from None
+    if not isinstance(root, yaml.MappingNode):
+        raise _mistake(file, 1, "the path is empty", "give it at least one line or arc under pieces:")
+    return root
+
+
+def _piece_lines(root: yaml.Node) -> list[int]:
+    """Line of each piece, from 1."""
+    for key, value in root.value:
+        if key.value == "pieces" and isinstance(value, yaml.SequenceNode):
+            return [item.start_mark.line + 1 for item in value.value]
+    return []
+
+
+def _plain(node: yaml.Node, depth: int) -> Any:
+    """The value of a node; a plain scalar that is a finite number is one, everything else is text."""
+    if depth > _MAX_DEPTH:
+        raise RecursionError
+    if isinstance(node, yaml.MappingNode):
+        return {key.value: _plain(value, depth + 1) for key, value in node.value if isinstance(key, yaml.ScalarNode)}
+    if isinstance(node, yaml.SequenceNode):
+        return [_plain(item, depth + 1) for item in node.value]
+    if isinstance(node, yaml.ScalarNode) and not node.style:
+        try:
+            number = float(node.value)
+        except ValueError:
+            return node.value
+        return number if math.isfinite(number) else node.value
+    return node.value
