@@ -1,14 +1,13 @@
-"""Runs of a following law on a semi-trailer, and what comes out of them."""
+"""Runs of a law on the ideal semi-trailer, and what comes out of them."""
 
 from __future__ import annotations
 
 import math
-import random
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from itertools import product
 from typing import Final
 
+from daemon.campaigns.cases import DURATION_S, PERIOD_S, SPEED_M_S, Case, Outcome
 from daemon.campaigns.ideal_semitrailer import (
     CIRCLE_BACKWARDS,
     LINE_BACKWARDS,
@@ -18,14 +17,14 @@ from daemon.campaigns.ideal_semitrailer import (
     placed,
 )
 from daemon.loops.cascade_following import CascadeFollower, CascadeTuning
+from daemon.loops.geometry import clamp
 from daemon.loops.odometry import Pose
 from daemon.loops.path import Path, Piece
-from daemon.loops.path_following import FollowingStep, FollowingTuning, PathFollower
+from daemon.loops.path_following import FollowingStep, FollowingTuning, PathFollower, bending_law
 
-SPEED_M_S: Final = 0.2
 NEAR_M: Final = 0.01
 NEAR_RAD: Final = math.radians(1)
-
+PATHS: Final = {"line": LINE_BACKWARDS, "circle": CIRCLE_BACKWARDS}
 
 Law = Callable[[Pose, float, float, float], FollowingStep]
 """A command from the pose of the reference unit, bending angle, steering angle and speed."""
@@ -48,14 +47,18 @@ class Run:
     """What a run showed at its control instants.
 
     Attributes:
+        way_m: driven so far, by the truck.
         position_m: to the left on a line, to the outside on a circle.
         heading_rad, bending_rad: errors.
+        steering_rad: commanded.
         settle_m: way after which position and heading stay near the path's; None when they never do.
     """
 
+    way_m: list[float] = field(default_factory=list)
     position_m: list[float] = field(default_factory=list)
     heading_rad: list[float] = field(default_factory=list)
     bending_rad: list[float] = field(default_factory=list)
+    steering_rad: list[float] = field(default_factory=list)
     settle_m: float | None = None
 
     @property
@@ -63,68 +66,107 @@ class Run:
         """Largest errors of position, heading and bending angle."""
         return (_largest(self.position_m), _largest(self.heading_rad), _largest(self.bending_rad))
 
+    def add(self, way_m: float, errors: tuple[float, float, float], steering_rad: float) -> None:
+        """One control instant; errors of position, heading and bending angle."""
+        self.way_m.append(way_m)
+        for values, error in zip((self.position_m, self.heading_rad, self.bending_rad), errors, strict=True):
+            values.append(error)
+        self.steering_rad.append(steering_rad)
+
+    def settle(self, near: Callable[[int], bool]) -> None:
+        """Set ``settle_m`` to the way at the first instant after which all are near."""
+        count = len(self.way_m)
+        settled = next((instant + 1 for instant in reversed(range(count)) if not near(instant)), 0)
+        self.settle_m = self.way_m[settled] if settled < count else None
+
 
 def _largest(values: list[float]) -> float:
     return max(map(abs, values))
+
+
+def _way(step_m: float, steps: int) -> float:
+    return round(step_m * steps, 9)
+
+
+def outside_sign(piece: Piece) -> float:
+    """Factor from an error of position to the left to one to the outside of a circle."""
+    return -1.0 if piece.heading_curvature > 0 else 1.0
 
 
 def drive(
     law: Law,
     plant: SemitrailerPlant,
     piece: Piece,
-    duration_s: float,
-    period_s: float = 0.05,
+    duration_s: float = DURATION_S,
+    period_s: float = PERIOD_S,
     speed_m_s: float = SPEED_M_S,
 ) -> Run:
     """Let a law drive along an endless piece, its command held for a period."""
     run = Run()
-    sign = -1.0 if piece.heading_curvature > 0 else 1.0
+    sign = outside_sign(piece)
     speed = -speed_m_s if piece.backward else speed_m_s
-    last_off = -1
     for instant in range(round(duration_s / period_s) + 1):
         reference = plant.trailer if piece.backward else plant.truck
         step = law(reference, plant.bending_rad, plant.steering_rad, speed)
         errors = step.errors
-        run.position_m.append(sign * errors.position_m)
-        run.heading_rad.append(errors.heading_rad)
-        run.bending_rad.append(errors.bending_rad or 0.0)
-        if abs(errors.position_m) > NEAR_M or abs(errors.heading_rad) > NEAR_RAD:
-            last_off = instant
+        shown = (sign * errors.position_m, errors.heading_rad, errors.bending_rad or 0.0)
+        run.add(_way(speed_m_s * period_s, instant), shown, step.steering_rad)
         plant.advance(speed, step.steering_rad, period_s)
-    settled = last_off + 1
-    run.settle_m = speed_m_s * period_s * settled if settled < len(run.position_m) else None
+    run.settle(lambda i: abs(run.position_m[i]) <= NEAR_M and abs(run.heading_rad[i]) <= NEAR_RAD)
     return run
 
 
-State = tuple[Piece, Errors]
+def bend(case: Case) -> Run:
+    """Steer the bending angle from one value to another by the thesis' law (section 6.1), without a path."""
+    run = Run()
+    start = Errors(0.0, 0.0, math.radians(case.bending_deg))
+    plant, target = placed(LINE_BACKWARDS, start, _rate(case)), math.radians(case.target_deg)
+    for instant in range(round(DURATION_S / PERIOD_S) + 1):
+        wanted = bending_law(SEMITRAILER, case.bending_gain, target, plant.bending_rad)
+        steering = clamp(wanted, SEMITRAILER.max_steering_rad)
+        run.add(_way(SPEED_M_S * PERIOD_S, instant), (0.0, 0.0, plant.bending_rad - target), steering)
+        plant.advance(-SPEED_M_S, steering, PERIOD_S)
+    run.settle(lambda i: abs(run.bending_rad[i]) <= NEAR_RAD)
+    return run
 
 
-def forty_states() -> list[State]:
-    """The initial errors of the thesis' section 6.2 on line and circle: single ones, and those of Table B.1 on both."""
-    signs = (1, -1)
-    single = [Errors(position_m=sign * size) for size in (0.1, 0.2) for sign in signs]
-    single += [Errors(heading_rad=math.radians(sign * size)) for size in (5, 10) for sign in signs]
-    single += [Errors(bending_rad=math.radians(sign * size)) for size in (5, 10) for sign in signs]
-    turned = [math.radians(sign * 10) for sign in signs]
-    combined = [Errors(position_m=sign * y, heading_rad=t) for y, sign, t in product((0.1, 0.2), signs, turned)]
-    return list(product((LINE_BACKWARDS, CIRCLE_BACKWARDS), single + combined))
+def _rate(case: Case) -> float | None:
+    return None if case.rate_deg_s is None else math.radians(case.rate_deg_s)
 
 
-def random_states(count: int, seed: int) -> list[State]:
-    """Errors of position within 0.25 m, of heading and bending angle within 15 degrees; line and circle in turn."""
-    chance = random.Random(seed)
-    angle = math.radians(15)
-    paths = (LINE_BACKWARDS, CIRCLE_BACKWARDS)
-    return [
-        (
-            paths[number % 2],
-            Errors(chance.uniform(-0.25, 0.25), chance.uniform(-angle, angle), chance.uniform(-angle, angle)),
-        )
-        for number in range(count)
-    ]
+def errors_of(case: Case) -> Errors:
+    """The errors that a case begins with, in SI."""
+    return Errors(case.position_m, math.radians(case.heading_deg), math.radians(case.bending_deg))
 
 
-def campaign(law: Callable[[Piece, float | None], Law], states: list[State], rate_deg_s: float | None) -> list[Run]:
-    """One run of 20 s from each state, at ``SPEED_M_S`` and 50 ms."""
-    rate = None if rate_deg_s is None else math.radians(rate_deg_s)
-    return [drive(law(piece, rate), placed(piece, errors, rate), piece, 20.0) for piece, errors in states]
+def ideal_run(case: Case) -> Run:
+    """Drive a case with ideal kinematics."""
+    if case.path == "none":
+        return bend(case)
+    piece, rate = PATHS[case.path], _rate(case)
+    if case.law == "thesis":
+        law = thesis_law(piece, FollowingTuning(case.look_ahead_m, case.bending_gain))
+    else:
+        law = cascade_law(piece, rate)
+    return drive(law, placed(piece, errors_of(case), rate), piece)
+
+
+def outcome(run: Run, ended: str = "driven") -> Outcome:
+    """The figures of a run."""
+    position, heading, bending = run.worst
+    return Outcome(
+        run.settle_m,
+        position,
+        math.degrees(heading),
+        math.degrees(bending),
+        _overshoot(run.position_m),
+        math.degrees(_overshoot(run.bending_rad)),
+        ended,
+    )
+
+
+def _overshoot(errors: list[float]) -> float:
+    """The largest error on the other side than the first one; 0 without a first one."""
+    if not errors[0]:
+        return 0.0
+    return max(0.0, *(-error if errors[0] > 0 else error for error in errors))

@@ -62,6 +62,7 @@ COMMANDS: dict[Group, dict[str, str]] = {
         "demo": "daemon.cli.demo:demo",
         "simulate": "daemon.cli.simulate:simulate",
         "sim": "daemon.cli.sim:app",
+        "campaign": "daemon.cli.campaign:app",
     },
 }
 """Commands by group, in the order of the help; module and function (or a noun's own app) of each."""

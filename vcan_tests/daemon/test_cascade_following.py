@@ -9,15 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from daemon.campaigns.following_runs import (
-    Run,
-    campaign,
-    cascade_law,
-    drive,
-    forty_states,
-    random_states,
-    thesis_law,
-)
+from daemon.campaigns.cases import Law, Outcome, State, following, random_states, thesis_states
+from daemon.campaigns.following_runs import cascade_law, drive
 from daemon.campaigns.ideal_semitrailer import (
     CIRCLE_BACKWARDS,
     LINE_BACKWARDS,
@@ -26,6 +19,7 @@ from daemon.campaigns.ideal_semitrailer import (
     forwards,
     placed,
 )
+from daemon.campaigns.workers import drive_batch
 from daemon.loops.articulated import ArticulatedVehicle
 from daemon.loops.cascade_following import CascadeFollower, CascadeTuning
 from daemon.loops.odometry import Pose
@@ -35,40 +29,39 @@ from daemon.loops.path_following import Limit
 PIECES = [LINE_BACKWARDS, CIRCLE_BACKWARDS, forwards(LINE_BACKWARDS), forwards(CIRCLE_BACKWARDS)]
 
 
-def settling(runs: list[Run]) -> list[float]:
+def driven(law: Law, states: list[State], rate_deg_s: float | None) -> list[Outcome]:
+    return [out for _, out in drive_batch(following("test", states, law, rate_deg_s))]
+
+
+def settling(runs: list[Outcome]) -> list[float]:
     """Settling distances; a run that never settles fails the test."""
     distances = [run.settle_m for run in runs if run.settle_m is not None]
     assert len(distances) == len(runs)
     return distances
 
 
-def worst_deg(runs: list[Run], kind: int) -> float:
-    return math.degrees(max(run.worst[kind] for run in runs))
-
-
 def test_on_the_thesis_states_with_a_slow_steering_it_keeps_its_bounds() -> None:
-    runs = campaign(cascade_law, forty_states(), 60)
+    runs = driven("cascade", thesis_states(), 60)
     distances = settling(runs)
     assert mean(distances) <= 0.95
     assert max(distances) <= 1.85
-    assert worst_deg(runs, 1) <= 17.5
-    assert worst_deg(runs, 2) <= 32
+    assert max(run.worst_heading_deg for run in runs) <= 17.5
+    assert max(run.worst_bending_deg for run in runs) <= 32
 
 
 @pytest.mark.parametrize("rate_deg_m", [200, 230, 400, 1000, None])
 def test_it_settles_whatever_the_steerings_rate(rate_deg_m: float | None) -> None:
-    settling(campaign(cascade_law, forty_states(), rate_deg_m and rate_deg_m * 0.2))
+    settling(driven("cascade", thesis_states(), rate_deg_m and rate_deg_m * 0.2))
 
 
 @pytest.mark.parametrize("rate_deg_s", [60, None])
 def test_from_random_states_it_is_better_than_the_thesis_law(rate_deg_s: float | None) -> None:
     states = random_states(60, seed=62)
-    ours = campaign(cascade_law, states, rate_deg_s)
-    theirs = campaign(lambda piece, rate: thesis_law(piece), states, rate_deg_s)
+    ours, theirs = driven("cascade", states, rate_deg_s), driven("thesis", states, rate_deg_s)
     settling(ours)
     both = [(a, b) for a, b in zip(ours, theirs, strict=True) if b.settle_m is not None]
     assert mean(a.settle_m or 0.0 for a, _ in both) < mean(b.settle_m or 0.0 for _, b in both)
-    assert worst_deg([a for a, _ in both], 2) < worst_deg([b for _, b in both], 2)
+    assert max(a.worst_bending_deg for a, _ in both) < max(b.worst_bending_deg for _, b in both)
 
 
 @pytest.mark.parametrize("piece", PIECES)
