@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from drivers.canopen.codes import NMT_COMMANDS, NMT_STATES
 from drivers.canopen.objects import ObjectDef, ObjectTable
 from drivers.encoder.objects import OBJECTS as ENCODER_OBJECTS
-from drivers.epos.codec import RPDO1_MAPS, TPDO1_MAP
+from drivers.epos.codec import RPDO1_MAPS, TPDO1_MAP, TPDO2_MAP
 from drivers.epos.codes import EMERGENCIES
 from drivers.epos.objects import OBJECTS as EPOS_OBJECTS
 from drivers.epos.state_machine import STATES, Mode, command_of, state_of
@@ -55,6 +55,7 @@ PDO_MAPS: dict[str, tuple[PdoMap, ...]] = {
         _map(_FACTORY, EPOS_OBJECTS, "velocity_actual_value", "position_actual_value"),
     ),
     "TPDO2": (
+        PdoMap(_OURS, TPDO2_MAP),
         _map(_ENCODER, ENCODER_OBJECTS, "position_value"),
         _map(_FACTORY, EPOS_OBJECTS, "current_actual_value", "analog_input_1", "analog_input_2"),
         _map(_FACTORY + ", two objects counted", EPOS_OBJECTS, "current_actual_value", "analog_input_1"),

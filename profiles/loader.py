@@ -18,7 +18,7 @@ from profiles.schema import Profile
 from profiles.shape import Shape
 
 SHIPPED = Path(__file__).resolve().parent
-SEARCH: tuple[Path, ...] = (Path("/etc/canhelm/robots"), SHIPPED / "robots")
+SEARCH: tuple[Path, ...] = (Path(os.environ.get("CANHELM_ROBOTS", "/etc/canhelm/robots")), SHIPPED / "robots")
 """Where a name is looked for: this machine's robots first, then the shipped ones."""
 CALIBRATION = ".calibration.yaml"
 """Ending of the side file beside a robot's file that machines write; merged last."""

@@ -6,11 +6,12 @@ from typing import Annotated, Literal
 
 from cyclopts import App, Parameter
 
-from daemon.cli.options import DEFAULT, Options, node_of
+from daemon.cli.options import DEFAULT, Node, Options, node_of
 from daemon.cli.output import show
 
 app = App(name="sim", help="Do things to the simulated network.")
 
+Input = Annotated[int, Parameter(help="Number of the digital input, 1 to 6.")]
 NodeOrAll = Annotated[str, Parameter(help="Node id (1 to 127), a name from the profile, or all.")]
 
 
@@ -23,3 +24,14 @@ def power(node: NodeOrAll, state: Literal["on", "off"], /, *, options: Options =
     wanted = node_of(node)
     with options.client() as client:
         show(client.call("simulation.power", node=wanted, on=state == "on"), json=options.json)
+
+
+@app.command(name="input")
+def digital_input(node: Node, number: Input, level: Literal["low", "high"], /, *, options: Options = DEFAULT) -> None:
+    """Apply a level to a digital input of a simulated drive, as an emergency stop button does.
+
+    Example: `canhelm sim input front_left 1 low`
+    """
+    wanted = node_of(node)
+    with options.client() as client:
+        show(client.call("simulation.input", node=wanted, input=number, level=level), json=options.json)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
-from canhelm.errors import NodeAbsent, Refused
+from canhelm.errors import Refused
 from daemon.runtime.brake_commands import BrakeCommands
 from daemon.runtime.config_commands import ConfigCommands
 from daemon.runtime.handlers import Handler, Params, holder, node_number, run_motion
@@ -13,6 +12,8 @@ from daemon.runtime.motions import Motion
 from daemon.runtime.motor_commands import MotorCommands
 from daemon.runtime.network_commands import NetworkCommands
 from daemon.runtime.node_commands import NodeCommands
+from daemon.runtime.path_commands import PathCommands, PathVehicle
+from daemon.runtime.simulation_commands import Network, SimulationCommands
 from daemon.runtime.supervisor import Supervisor
 from drivers.contract import DriveState
 
@@ -22,27 +23,28 @@ class Commands:
 
     Args:
         supervisor: what decides.
-        power: switches the supply of simulated nodes (``(node or "all", on)``); None on a real network.
+        network: the simulated network; None where it is real.
     """
 
-    def __init__(self, supervisor: Supervisor, power: Callable[[int | str, bool], None] | None = None) -> None:
+    def __init__(self, supervisor: Supervisor, network: Network | None = None) -> None:
         self._supervisor = supervisor
-        self._power = power
         self.handlers: dict[str, Handler] = {
             "stop": self._stop,
             "estop": self._estop,
             "reset": self._reset,
             "motion.wait": self._motion_wait,
             "motion.stop": self._motion_stop,
-            "simulation.power": self._simulation_power,
             **MotorCommands(supervisor).handlers,
             **BrakeCommands(supervisor).handlers,
             **NetworkCommands(supervisor).handlers,
             **NodeCommands(supervisor).handlers,
             **ConfigCommands(supervisor).handlers,
+            **SimulationCommands(supervisor, network).handlers,
         }
         for method in supervisor.vehicle.methods:
             self.handlers[method] = self._vehicle_handler(method)
+        if isinstance(supervisor.vehicle, PathVehicle):
+            self.handlers |= PathCommands(supervisor, supervisor.vehicle).handlers
 
     async def call(self, method: str, params: Params, lease: str | None) -> dict[str, Any]:
         """Carry out one method.
@@ -113,18 +115,3 @@ class Commands:
         motion.stop("its client stopped it")
         await motion.closed.wait()
         return {"motion": motion.identity, "state": self._supervisor.state.value}
-
-    def _member(self, node: int | str) -> int:
-        number = node_number(self._supervisor, node)
-        if number not in self._supervisor.devices.by_node:
-            raise NodeAbsent(
-                f"no node {number} is simulated", node=number, remedy="`canhelm status` lists the nodes of the profile"
-            )
-        return number
-
-    async def _simulation_power(self, params: Params, lease: str | None) -> dict[str, Any]:
-        if self._power is None:
-            raise Refused("this network is real: its power is switched by hand")
-        node = "all" if params["node"] == "all" else self._member(params["node"])
-        self._power(node, bool(params["on"]))
-        return {"node": params["node"], "on": bool(params["on"])}

@@ -13,8 +13,8 @@ TPDO1_MAP = (OBJECTS["statusword"], OBJECTS["position_actual_value"], OBJECTS["c
 TPDO1 = pdo_struct(TPDO1_MAP)
 TPDO1_BYTES = TPDO1.size
 
-TPDO2_MAP = (OBJECTS["analog_input_1"], OBJECTS["analog_input_2"])
-"""Where a profile asks for the analog inputs."""
+TPDO2_MAP = tuple(OBJECTS[name] for name in ("analog_input_1", "analog_input_2", "digital_input_functions_state"))
+"""Where a profile asks for the analog inputs, or has an emergency stop at a digital one."""
 TPDO2 = pdo_struct(TPDO2_MAP)
 
 TARGET_OBJECT = {

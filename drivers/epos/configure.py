@@ -11,6 +11,7 @@ from drivers.canopen.pdo import Settings
 from drivers.canopen.sdo import SdoClient
 from drivers.epos.codec import DRIVING_MODES
 from drivers.epos.codes import EMERGENCIES
+from drivers.epos.emergency_stop_input import EmergencyStopInput
 from drivers.epos.objects import OBJECTS
 from drivers.epos.outputs import OutputBits
 from drivers.epos.parameters import guarding_plan, parameter_plan, pdo_plan, start_up_plan
@@ -40,14 +41,24 @@ class EposSetup:
         sdo: the node's client.
         who: the node for people.
         outputs: its digital outputs, which carry the brakes.
+        stop_input: its input with an emergency stop.
     """
 
-    def __init__(self, config: DriveConfig, network: Network, sdo: SdoClient, who: str, outputs: OutputBits) -> None:
+    def __init__(
+        self,
+        config: DriveConfig,
+        network: Network,
+        sdo: SdoClient,
+        who: str,
+        outputs: OutputBits,
+        stop_input: EmergencyStopInput | None,
+    ) -> None:
         self._config = config
         self._network = network
         self._sdo = sdo
         self._who = who
         self._outputs = outputs
+        self._stop_input = stop_input
         self._written = Configuration(sdo, who)
 
     def steps(self) -> tuple[Step, ...]:
@@ -59,7 +70,7 @@ class EposSetup:
             Step("setting up guarding", self._write_guarding),
             Step("mapping its PDOs", self._write_pdos),
             Step("writing its limits and ramps", self._write_parameters),
-            Step("setting up its brake output", self._write_outputs),
+            Step("setting up its inputs and outputs", self._write_inputs_and_outputs),
             Step("writing zero targets", self._write_zero_targets),
             Step("setting its mode of operation", self._write_mode),
             Step("reading everything back", self._written.verify),
@@ -124,7 +135,9 @@ class EposSetup:
                 f"a replaced drive is made like the old one by `canhelm config restore DIR {node}`",
             )
 
-    async def _write_outputs(self) -> None:
+    async def _write_inputs_and_outputs(self) -> None:
+        if self._stop_input:
+            await self._stop_input.set_up(self._sdo, self._written)
         await self._outputs.set_up(self._written)
 
     async def _write_zero_targets(self) -> None:

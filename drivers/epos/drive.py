@@ -16,6 +16,7 @@ from drivers.epos import device_control, moves
 from drivers.epos.codec import DRIVING_MODES, RPDO1, TPDO1, TPDO1_BYTES, TPDO2, make_rpdo3
 from drivers.epos.configure import EposSetup, emergency_words
 from drivers.epos.device_control import drive_state
+from drivers.epos.emergency_stop_input import EmergencyStopInput
 from drivers.epos.objects import OBJECTS
 from drivers.epos.outputs import OutputBits
 from drivers.epos.state_machine import Command, Mode, State
@@ -77,7 +78,8 @@ class EposDrive(CanopenDevice):
         self.waiters = StatuswordWaiters(self.who, config.node)
         master.subscribe(tpdo_cob_id(1, config.node), self._on_tpdo1)
         self._reads_analog = config.analog_inputs
-        if config.analog_inputs:
+        self._stop_input = EmergencyStopInput(config.emergency_stop, self.who) if config.emergency_stop else None
+        if config.tells_inputs:
             master.subscribe(tpdo_cob_id(2, config.node), self._on_tpdo2)
 
     # --- cyclic --------------------------------------------------------------------------------------------------
@@ -104,10 +106,20 @@ class EposDrive(CanopenDevice):
         if len(data) != TPDO2.size:
             self.master.counters.malformed += 1
             return
-        self.analog_mv = TPDO2.unpack(data)
+        x_mv, y_mv, inputs = TPDO2.unpack(data)
+        self.analog_mv = (x_mv, y_mv)
         self.analog_time_s = timestamp
-        if self.on_reading is not None:
+        if self._stop_input is not None:
+            self._stop_input.take(inputs, timestamp)
+        if self.on_reading is not None and self._reads_analog:
             self.on_reading(self.node)
+
+    @property
+    def emergency_stop(self) -> str:
+        """Why it demands an emergency stop; empty where it does not."""
+        if self._stop_input is None or self.node_state is not NodeState.READY:
+            return ""
+        return self._stop_input.reason(self.reading_time_s)
 
     def command_speed(self, speed_m_s: float) -> None:
         """Take a target speed at the rim for the next :meth:`transmit`; zero unless enabled in the driving mode."""
@@ -287,12 +299,14 @@ class EposDrive(CanopenDevice):
 
     def boot_steps(self) -> tuple[Step, ...]:
         """Configuration in pre-operational; see :class:`drivers.epos.configure.EposSetup`."""
-        return EposSetup(self.config, self.master.network, self.sdo, self.who, self.outputs).steps()
+        return EposSetup(self.config, self.master.network, self.sdo, self.who, self.outputs, self._stop_input).steps()
 
     def start_steps(self) -> tuple[Step, ...]:
         """Its first reading proves that PDO mapping and SYNC work."""
         self.reading_time_s = -math.inf
         self._travel.begin_anew()
+        if self._stop_input:
+            self._stop_input.begin_anew(asyncio.get_running_loop().time())
         return (Step("waiting for its first reading (TPDO1 after SYNC)", self._first_reading),)
 
     async def _first_reading(self) -> None:

@@ -67,7 +67,7 @@ def pdo_plan(config: DriveConfig, *, synchronous: bool = True) -> Settings:
     """COB-IDs, transmission types and mappings; unused PDOs too, because at factory settings all belong to node 1."""
     node, rpdo1_map = config.node, RPDO1_MAPS[DRIVING_MODES[config.mode]]
     cyclic = ON_SYNC if synchronous else AT_ONCE
-    tpdo2 = (cyclic, TPDO2_MAP) if config.analog_inputs else (AT_ONCE, None)
+    tpdo2 = (cyclic, TPDO2_MAP) if config.tells_inputs else (AT_ONCE, None)
     return [
         *rpdo_settings(OBJECTS, 1, node, cyclic, rpdo1_map),
         *rpdo_settings(OBJECTS, 2, node, AT_ONCE),

@@ -61,6 +61,7 @@ class SerialGatewayBus(Bus):
         bit_rate: bit/s of the CAN bus behind it.
         gateway: node id of the drive on the line.
         encoders: object dictionaries of the encoders by node id; all other nodes are drives.
+        inputs: drives whose digital inputs are read in each cycle.
         facts: what was planned for the line, for ``status``.
 
     Attributes:
@@ -77,6 +78,7 @@ class SerialGatewayBus(Bus):
         bit_rate: int,
         gateway: int,
         encoders: Mapping[int, ObjectTable],
+        inputs: frozenset[int],
         facts: Mapping[str, Any],
     ) -> None:
         super().__init__(name, bit_rate)
@@ -91,7 +93,7 @@ class SerialGatewayBus(Bus):
         self._facts = facts
         self._bridges: dict[int, SdoBridge] = {}
         self._long_transfers = asyncio.Lock()
-        self._readings = Readings(gateway, encoders, self._submit, self._receive)
+        self._readings = Readings(gateway, encoders, inputs, self._submit, self._receive)
         self._toggles: dict[int, int] = {}
         self._spoke_s: dict[int, float] = {}
         self._guarded_s: dict[int, float] = {}

@@ -80,20 +80,21 @@ def plan(profile: Profile, baud: int) -> SerialPlan:
     """The control cycle of a profile over a line.
 
     Each cycle reads the gateway drive by two objects and every other drive by one remote frame of eight bytes, reads
-    every encoder, writes four objects of the gateway drive and one frame to each other drive. Each node but the gateway
+    every encoder and every input with an emergency stop, writes four objects of the gateway drive and one frame to each other drive. Each node but the gateway
     is guarded once in :attr:`SerialPlan.guard_time_s`.
     """
     others, encoders = len(profile.drives) - 1, len(profile.encoders)
     gateway_s = 2 * exchange_s(READ_BYTES, baud, forwarded=False) + 4 * exchange_s(WRITE_BYTES, baud, forwarded=False)
     drive_s = exchange_s(REQUEST_FRAME_BYTES + 8, baud, forwarded=True)
     drive_s += exchange_s(SEND_FRAME_BYTES, baud, forwarded=True)
-    encoder_s = exchange_s(READ_BYTES, baud, forwarded=True)
-    cycle_s = SPARE * (gateway_s + others * drive_s + encoders * encoder_s)
+    inputs = sum(drive.emergency_stop is not None for drive in profile.drives.values())
+    object_s = exchange_s(READ_BYTES, baud, forwarded=True)
+    cycle_s = SPARE * (gateway_s + others * drive_s + (encoders + inputs) * object_s)
     guarded = others + encoders
     guard_s = guarded * exchange_s(REQUEST_FRAME_BYTES + 1, baud, forwarded=True)
     guard_time_s = math.ceil(10 * max(4 * cycle_s, 10 * guard_s)) / 10
     cycle_s += guard_s * cycle_s / guard_time_s
-    return SerialPlan(baud, cycle_s, 6 + 2 * others + encoders, guard_time_s)
+    return SerialPlan(baud, cycle_s, 6 + 2 * others + encoders + inputs, guard_time_s)
 
 
 def serial_speed_m_s(speed_m_s: float, deceleration_m_s2: float, can_cycle_s: float, serial_cycle_s: float) -> float:

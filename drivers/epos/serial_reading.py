@@ -47,6 +47,7 @@ class Readings:
     Args:
         gateway: node id of the drive on the line.
         encoders: object dictionaries of the encoders by node id.
+        inputs: drives whose digital inputs are read as well.
         submit: sends a request.
         receive: takes each frame, COB-ID and data.
 
@@ -58,12 +59,14 @@ class Readings:
         self,
         gateway: int,
         encoders: Mapping[int, ObjectTable],
+        inputs: frozenset[int],
         submit: Submit,
         receive: Callable[[int, bytes], None],
     ) -> None:
         self.states: dict[int, NmtState] = {}
         self._gateway = gateway
         self._encoders = encoders
+        self._inputs = inputs
         self._submit = submit
         self._receive = receive
         self._asked: set[int] = set()
@@ -84,6 +87,8 @@ class Readings:
         for node, state in self.states.items():
             if state is not NmtState.OPERATIONAL or node in left_out or node in self._asked:
                 continue
+            if node in self._inputs:
+                self._read_inputs(node)
             if node == self._gateway:
                 self._read_gateway()
             elif node in self._encoders:
@@ -97,6 +102,14 @@ class Readings:
 
     def _read(self, node: int, entry: ObjectDef, take: OnData, then: Callable[[], None] | None = None) -> None:
         self._submit(make_read_object(node, entry.index, entry.sub), node, math.inf, take, then=then)
+
+    def _read_inputs(self, node: int) -> None:
+        """Its digital inputs, handed up as a TPDO2 without the analog ones."""
+
+        def take(data: bytes) -> None:
+            self._receive(0x280 + node, b"\0\0\0\0" + data[:2])
+
+        self._read(node, EPOS["digital_input_functions_state"], take)
 
     # --- the gateway ---------------------------------------------------------------------------------------------
 

@@ -82,6 +82,7 @@ SENT: list[tuple[str, str, dict[str, Any]]] = [
     ("sdo write 1 0x6083 0x10", "sdo.write", {"value": 16}),
     ("sdo write 1 target_velocity -20", "sdo.write", {"value": -20}),
     ("sim power all off", "simulation.power", {"node": "all", "on": False}),
+    ("sim input 3 1 low", "simulation.input", {"node": 3, "input": 1, "level": "low"}),
 ]
 
 

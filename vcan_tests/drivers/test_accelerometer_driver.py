@@ -56,7 +56,7 @@ async def test_a_frame_of_the_wrong_length_is_counted_and_dropped() -> None:
         port = robot.app.medium.port("liar") if robot.app.medium else None
         assert port is not None
         await port.open()
-        port.send(0x281, TPDO2.pack(1, 2) + b"\x00")
+        port.send(0x281, TPDO2.pack(1, 2, 0) + b"\x00")
         await asyncio.sleep(0.01)
         assert robot.app.master.counters.malformed == 1
         await port.close()

@@ -60,6 +60,7 @@ TYPED = (
     ("config backup {folder}/settings", 0, "604#4083600000000000"),
     ("config restore {folder}/settings 1 --yes", 0, ""),
     ("sim power 3 off", 1, ""),
+    ("sim input 3 1 low", 1, ""),
 )
 """What is typed, in this order, its exit code, and the beginning of a frame that it brings."""
 

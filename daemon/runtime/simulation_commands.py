@@ -1,0 +1,64 @@
+"""The ``simulation.*`` methods: what one does by hand to a real network."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from canhelm.errors import NodeAbsent, Refused
+from daemon.runtime.handlers import Handler, Params, node_number
+from daemon.runtime.supervisor import Supervisor
+
+
+class Network(Protocol):
+    """What can be done to a simulated network."""
+
+    def power_on(self, which: int | str = "all") -> None:
+        """Switch on one node, or all."""
+
+    def power_off(self, which: int | str = "all") -> None:
+        """Switch off one node, or all."""
+
+    def set_input(self, node: int, number: int, level: bool) -> None:
+        """Apply a level to a digital input of a drive."""
+
+
+class SimulationCommands:
+    """Handlers of the ``simulation.*`` methods, by name in :attr:`handlers`.
+
+    Args:
+        supervisor: for the names of nodes.
+        network: the simulated network; None where it is real.
+    """
+
+    def __init__(self, supervisor: Supervisor, network: Network | None) -> None:
+        self._supervisor = supervisor
+        self._network = network
+        self.handlers: dict[str, Handler] = {"simulation.power": self._power, "simulation.input": self._input}
+
+    async def _power(self, params: Params, lease: str | None) -> dict[str, Any]:
+        network = self._simulated("its power is switched by hand")
+        node, on = "all" if params["node"] == "all" else self._member(params["node"]), bool(params["on"])
+        switch = network.power_on if on else network.power_off
+        switch(node)
+        return {"node": params["node"], "on": on}
+
+    async def _input(self, params: Params, lease: str | None) -> dict[str, Any]:
+        network = self._simulated("its inputs are wired")
+        node, number, level = self._member(params["node"]), int(params["input"]), str(params["level"])
+        if node not in {drive.node for drive in self._supervisor.devices.drives.values()}:
+            raise NodeAbsent(f"node {node} is no drive and has no digital inputs", node=node, remedy="name a drive")
+        network.set_input(node, number, level == "high")
+        return {"node": params["node"], "input": number, "level": level}
+
+    def _simulated(self, why_not: str) -> Network:
+        if self._network is None:
+            raise Refused(f"this network is real: {why_not}")
+        return self._network
+
+    def _member(self, node: int | str) -> int:
+        number = node_number(self._supervisor, node)
+        if number not in self._supervisor.devices.by_node:
+            raise NodeAbsent(
+                f"no node {number} is simulated", node=number, remedy="`canhelm status` lists the nodes of the profile"
+            )
+        return number
