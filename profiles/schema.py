@@ -258,6 +258,14 @@ class SteeredAxle(Part, frozen=True, kw_only=True):
     acceleration_deg_s2: Positive
 
 
+class RegulatorGains(Part, frozen=True, kw_only=True):
+    """Gains of a PID regulator: of the error, its integral and its derivative."""
+
+    proportional: NotNegative
+    integral: NotNegative = 0.0
+    derivative: NotNegative = 0.0
+
+
 class CarGeometry(Part, frozen=True, kw_only=True, tag_field="type", tag="ackermann"):
     """Geometry and body of a car with front-wheel steering and two driven rear wheels (ENPM808X report, section 4)."""
 
@@ -275,6 +283,10 @@ class CarGeometry(Part, frozen=True, kw_only=True, tag_field="type", tag="ackerm
     """Names of the drives of the rear wheels: left, right."""
     steering: SteeredAxle
     """The front axle; its angle is that of a wheel between the two front ones (gamma)."""
+    heading_regulator: RegulatorGains
+    """Steering angle [rad] for an error of heading [rad]."""
+    speed_regulator: RegulatorGains
+    """Acceleration of the wheels [rad/s^2] for an error of speed [m/s]."""
 
 
 Geometry = PairedSteerGeometry | OmniGeometry | CarGeometry

@@ -18,6 +18,7 @@ class SteeredVehicle(Vehicle):
         wheels: drives of its wheels.
         steering: drive of the axle.
         encoders: of the axle, and of what else there is.
+        wheel_acceleration_m_s2: what the gate allows the wheels; None: what the vehicle may do.
 
     Attributes:
         arm_m: at which the steering drive's speed counts.
@@ -30,8 +31,9 @@ class SteeredVehicle(Vehicle):
         wheels: tuple[Drive, ...],
         steering: Drive,
         encoders: tuple[SteeringEncoder, ...],
+        wheel_acceleration_m_s2: float | None = None,
     ) -> None:
-        super().__init__(profile, (*wheels, steering), encoders)
+        super().__init__(profile, (*wheels, steering), encoders, (), wheel_acceleration_m_s2)
         self.arm_m = profile.drives[axle.drive].wheel_radius_m
         self._steering_gate = SteeringGate(axle, self.arm_m)
 

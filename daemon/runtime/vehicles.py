@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from canhelm.errors import ConfigError
+from daemon.runtime.car_vehicle import CarVehicle
 from daemon.runtime.omni_vehicle import OmniVehicle
 from daemon.runtime.paired_steer_vehicle import PairedSteerVehicle
 from daemon.runtime.vehicle import BareDrives, Vehicle
 from drivers.devices import Devices
-from profiles.schema import OmniGeometry, PairedSteerGeometry, Profile
+from profiles.schema import CarGeometry, OmniGeometry, PairedSteerGeometry, Profile
 
 
 def make_vehicle(profile: Profile, devices: Devices) -> Vehicle:
@@ -24,4 +25,8 @@ def make_vehicle(profile: Profile, devices: Devices) -> Vehicle:
         )
     if isinstance(geometry, OmniGeometry):
         return OmniVehicle(profile, tuple(devices.drives[name] for name in geometry.wheels), devices.accelerometer)
+    if isinstance(geometry, CarGeometry):
+        axle = geometry.steering
+        wheels = tuple(devices.drives[name] for name in geometry.wheels)
+        return CarVehicle(profile, wheels, devices.drives[axle.drive], devices.encoders[axle.encoder])
     raise ConfigError(f"profile {profile.name}: no loops for a vehicle of type {type(geometry).__name__}")

@@ -6,6 +6,7 @@ import asyncio
 from functools import partial
 from random import Random
 
+from drivers.simulated.ackermann import AckermannWorld
 from drivers.simulated.body import BodyWorld
 from drivers.simulated.brake import SimulatedBrake
 from drivers.simulated.bus import SimulatedBus
@@ -14,7 +15,7 @@ from drivers.simulated.epos import SimulatedEpos
 from drivers.simulated.max2d import Max2dWorld
 from drivers.simulated.node import SimulatedNode
 from drivers.simulated.omni import OmniWorld
-from profiles.schema import BrakeConfig, OmniGeometry, Profile
+from profiles.schema import BrakeConfig, CarGeometry, OmniGeometry, Profile
 
 _BOOT_DELAY_S = (0.05, 0.15)
 """Shortest and longest time from power-up to the boot-up message (assumed)."""
@@ -24,8 +25,11 @@ _WATCH_S = 0.01
 
 def make_world(profile: Profile, seed: int) -> BodyWorld:
     """The physics of a profile's vehicle. Raises ConfigError where it cannot be simulated."""
-    kind = OmniWorld if isinstance(profile.vehicle, OmniGeometry) else Max2dWorld
-    return kind(profile, seed)
+    if isinstance(profile.vehicle, OmniGeometry):
+        return OmniWorld(profile, seed)
+    if isinstance(profile.vehicle, CarGeometry):
+        return AckermannWorld(profile, seed)
+    return Max2dWorld(profile, seed)
 
 
 class SimulatedNetwork:

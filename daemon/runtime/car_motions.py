@@ -1,0 +1,147 @@
+"""Motions of a car, from their begin to rest."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from typing import Any, Protocol
+
+from canhelm.errors import DeviceFault
+from daemon.loops.ackermann_drive import CarLaw, CarOdometry, CarRecord, CarTarget
+from daemon.loops.measurement import Command, Measurement
+from daemon.runtime.motions import Motion
+from daemon.runtime.rest import AT_REST_M_S
+
+STREAM_END_S = 2.0
+"""A stream whose last value has been too old for this long is over."""
+
+
+class Senses(Protocol):
+    """What the vehicle knows of its own motion."""
+
+    odometry: CarOdometry
+
+
+class CarMotion(Motion):
+    """One target, for a time or a way, then rest.
+
+    Args:
+        senses: the pose.
+        law: of its own.
+        target: what to do.
+        duration_s: time after which the car comes to rest; None: when the target's way is covered, or until stopped.
+
+    Attributes:
+        record: of the last step; None before the first.
+        target: in force; None while the car comes to rest.
+    """
+
+    def __init__(
+        self,
+        kind: str,
+        drives: tuple[str, ...],
+        lease: str | None,
+        senses: Senses,
+        law: CarLaw,
+        target: CarTarget,
+        duration_s: float | None = None,
+    ) -> None:
+        super().__init__(kind, drives, lease)
+        self.record: CarRecord | None = None
+        self.target: CarTarget | None = target
+        self._senses = senses
+        self._law = law
+        self._remaining_s = duration_s
+        self._last_error_rad = 0.0
+
+    def step(self, measurement: Measurement, dt_s: float) -> Command:
+        """One step of the law; without a target it brings the car to rest."""
+        if self._remaining_s is not None:
+            self._remaining_s -= dt_s
+        if self.stop_reason or (self._remaining_s is not None and self._remaining_s <= 0.0):
+            self.target = None
+        command, record = self._law.step(measurement, self._senses.odometry.pose.yaw_rad, self.target, dt_s)
+        self.record = record
+        if self.target is not None:
+            self._last_error_rad = record.heading_error_rad
+        at_rest = all(abs(speed) < AT_REST_M_S for speed in measurement.wheel_speed_m_s)
+        if record.failure:
+            remedy = "`canhelm status` shows drives and encoders"
+            self.fail(DeviceFault(f"{self.kind}: {record.failure}", remedy=remedy))
+        elif record.done and at_rest and self._may_end():
+            self.finish(self._result(measurement.time_s))
+        return command
+
+    def _may_end(self) -> bool:
+        return True
+
+    def _result(self, now_s: float) -> dict[str, Any]:
+        pose = self._senses.odometry.pose
+        return {
+            "x_m": round(pose.x_m, 4),
+            "y_m": round(pose.y_m, 4),
+            "heading_deg": round(math.degrees(pose.yaw_rad), 3),
+            "heading_error_deg": round(math.degrees(self._last_error_rad), 3),
+            "duration_s": round(now_s - self.begun_s, 3),
+        }
+
+    def progress(self) -> dict[str, Any]:
+        """Steering, heading still to turn, speed, way to go."""
+        record = self.record
+        if record is None:
+            return {"phase": "enabling"}
+        asked = record.steering_target_rad
+        return {
+            "phase": "stopping" if self.target is None else "driving",
+            "steering_deg": round(math.degrees(record.steering_rad), 3),
+            "steering_target_deg": None if asked is None else round(math.degrees(asked), 3),
+            "heading_error_deg": round(math.degrees(record.heading_error_rad), 3),
+            "speed_m_s": round(record.speed_m_s, 4),
+            "remaining_m": None if record.remaining_m is None else round(record.remaining_m, 4),
+            "limits_active": list(record.limits_active),
+        }
+
+
+class CarStream(CarMotion):
+    """Driving by a stream of headings and speeds (``drive.set``); the car stops when the last one is too old.
+
+    Args:
+        valid_for_s: age at which the first value is too old.
+    """
+
+    streaming = True
+
+    def __init__(
+        self,
+        kind: str,
+        drives: tuple[str, ...],
+        lease: str | None,
+        senses: Senses,
+        law: CarLaw,
+        target: CarTarget,
+        valid_for_s: float,
+    ) -> None:
+        super().__init__(kind, drives, lease, senses, law, target)
+        self._age_s = 0.0
+        self.take(target, valid_for_s)
+
+    def take(self, target: CarTarget, valid_for_s: float) -> None:
+        """A new value."""
+        self._wanted = target
+        self._valid_for_s = valid_for_s
+        self._taken_s = asyncio.get_running_loop().time()
+
+    def step(self, measurement: Measurement, dt_s: float) -> Command:
+        """Follow the newest value, or come to rest where it is too old."""
+        self._age_s = measurement.time_s - self._taken_s
+        self.target = self._wanted if self._age_s <= self._valid_for_s else None
+        if not self.stop_reason and self._age_s > self._valid_for_s + STREAM_END_S:
+            self.stop("no new value came")
+        return super().step(measurement, dt_s)
+
+    def _may_end(self) -> bool:
+        return bool(self.stop_reason)
+
+    def progress(self) -> dict[str, Any]:
+        """As of any motion, and the age of the last value."""
+        return {**super().progress(), "value_age_ms": round(self._age_s * 1e3)}
