@@ -139,7 +139,7 @@ def interface_finding(name: str, folder: Path, details: Mapping[str, Any]) -> Fi
         set_up = "" if virtual else f" type can bitrate {rate or 1000000} restart-ms {RESTART_MS}"
         return Finding(name, "problem", f"down, {shown}", f"sudo ip link set {name} up{set_up}")
     if state == "BUS-OFF":
-        mend = f"check cable, termination and bit rate, then: sudo ip link set {name} type can restart"
+        mend = f"check cable, termination and bit rate, then: sudo ip link set {name} down; sudo ip link set {name} up"
         return Finding(name, "problem", shown, mend)
     if state in ("ERROR-PASSIVE", "ERROR-WARNING"):
         return Finding(name, "note", shown, "check cable, termination, bit rate, and that a node has power")

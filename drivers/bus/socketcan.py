@@ -96,7 +96,7 @@ class SocketCanBus(Bus):
         self.taps = _Taps(self._set_filters)
         self.foreign = 0
         self.overflowed = 0
-        self._controller = Controller(channel, f"then sudo ip link set {channel} type can restart")
+        self._controller = Controller(channel, f"then sudo ip link set {channel} down; sudo ip link set {channel} up")
         self._load = InterfaceLoad(channel, bit_rate)
         self._queue = TransmitQueue(self._transmit, self.counters)
         self._link: socket.socket | None = None

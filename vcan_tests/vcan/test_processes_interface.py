@@ -1,17 +1,34 @@
-"""An interface that fails while a robot drives: it goes down, or its controller goes bus-off."""
+"""An interface that fails while a robot drives: it goes down, or vanishes, or its controller goes bus-off."""
 
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Iterator
-from pathlib import Path
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
 
 import pytest
 
 from vcan_tests.kernel.slcan_adapter import SlcanAdapter
 from vcan_tests.vcan.bench import Bench, Daemon, Simulator, Status, bench, patient, write_profile
+from vcan_tests.vcan.stethoscope import (
+    DRIVES,
+    LIFE_GUARDING,
+    at_rest_after,
+    emergencies_after,
+    listen,
+    stop_s,
+)
+from vcan_tests.vcan.witness import Frame, candump
 
 pytestmark = [pytest.mark.vcan, pytest.mark.timeout(120)]
+
+SPEED_M_S = 0.3
+GUARDED = "network: {guard_time_ms: 250, life_time_factor: 4, boot_deadline_s: 20, sdo_timeout_s: 1, cycle_hz: 20}\n"
+LIFE_TIME_S, MARGIN_S = 1.0, 0.3
+"""Longer than a machine's pauses."""
+LISTENED_S = 2.0
 
 
 def link(interface: str, state: str) -> None:
@@ -59,23 +76,103 @@ def test_when_it_is_up_again_the_robot_boots_by_itself_and_drives_after_a_reset(
     assert drives(broken.daemon)
 
 
-def test_a_robot_behind_an_adapter_that_went_bus_off_drives_again_after_restart_and_reset(tmp_path: Path) -> None:
-    profile = write_profile(tmp_path, patient(cycle_hz=20))
-    with SlcanAdapter(bit_rate=1_000_000, carries_to="vcan1") as adapter:
-        simulator, daemon = Simulator(profile, "socketcan:vcan1"), Daemon(profile, "socketcan:can0")
-        try:
-            daemon.wait_for_state("idle")
-            daemon.begin("drive", "parallel", "--angle", "0", "--speed", "0.2", "--duration", "60")
-            daemon.wait_for_state("active")
-            adapter.report_state("bus-off", tx_errors=255)
-            status = daemon.wait_for(lambda status: status["bus"].get("down") == "bus-off")
-            assert status["bus"]["bus_offs"] == 1
-            daemon.wait_for_state("fault")
-            adapter.down()
-            adapter.up()
-            daemon.wait_for(lambda status: "down" not in status["bus"] and all_ready(status))
-            assert daemon.canhelm("reset").returncode == 0
-            assert drives(daemon)
-        finally:
-            daemon.end()
-            simulator.end()
+@dataclass(frozen=True)
+class Failure:
+    """One way to lose a CAN controller in mid-drive.
+
+    Attributes:
+        cause: what the status calls it.
+        remedy: part of what the status tells to do.
+        strike: lets it happen.
+        mend: does what mends it.
+    """
+
+    cause: str
+    remedy: str
+    strike: Callable[[SlcanAdapter], None]
+    mend: Callable[[SlcanAdapter, ExitStack], object]
+
+
+def plug_in(stack: ExitStack) -> SlcanAdapter:
+    """An adapter that makes the interface can0; the network behind it is on vcan1."""
+    return stack.enter_context(SlcanAdapter(bit_rate=1_000_000, carries_to="vcan1"))
+
+
+def restart(adapter: SlcanAdapter) -> None:
+    """Take the interface down and up again."""
+    adapter.down()
+    adapter.up()
+
+
+FAILURES = {
+    "interface down": Failure(
+        "Network is down", "ip link set can0 up", SlcanAdapter.down, lambda adapter, _: adapter.up()
+    ),
+    "interface gone": Failure(
+        "No such device", "ip link set can0 up", SlcanAdapter.unplug, lambda _, stack: plug_in(stack)
+    ),
+    "bus-off": Failure(
+        "bus-off",
+        "ip link set can0 down; sudo ip link set can0 up",
+        lambda adapter: adapter.report_state("bus-off", tx_errors=255),
+        lambda adapter, _: restart(adapter),
+    ),
+}
+
+
+@dataclass
+class FailedDrive:
+    """A robot that lost its controller while it drove.
+
+    Attributes:
+        daemon: its daemon, which saw it happen.
+        failure: what happened.
+        frames: what was on the drives' side of the failure from then on.
+        since_s: when it happened, wall-clock time.
+        mend: does what mends it.
+    """
+
+    daemon: Daemon
+    failure: Failure
+    frames: list[Frame]
+    since_s: float
+    mend: Callable[[], object]
+
+
+@pytest.fixture(scope="module", params=FAILURES)
+def failed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[FailedDrive]:
+    failure = FAILURES[request.param]
+    folder = tmp_path_factory.mktemp("failed")
+    profile = write_profile(folder, GUARDED)
+    with ExitStack() as stack:
+        adapter = plug_in(stack)
+        wire = stack.enter_context(candump("vcan1", folder / "candump.log"))
+        simulator = Simulator(profile, "socketcan:vcan1")
+        stack.callback(simulator.end)
+        daemon = Daemon(profile, "socketcan:can0")
+        stack.callback(daemon.end)
+        daemon.wait_for_state("idle")
+        Bench(profile, simulator, daemon, wire).drive(SPEED_M_S)
+        since_s = time.time()
+        failure.strike(adapter)
+        listen(LISTENED_S, "vcan1")
+        yield FailedDrive(daemon, failure, wire.frames(since_s), since_s, lambda: failure.mend(adapter, stack))
+
+
+def test_the_drives_behind_a_failed_interface_stop_by_life_guarding(failed: FailedDrive) -> None:
+    for node in DRIVES:
+        assert [code for code, _ in emergencies_after(failed.frames, node, failed.since_s)] == [LIFE_GUARDING]
+        assert at_rest_after(failed.frames, node, failed.since_s) < stop_s(SPEED_M_S, LIFE_TIME_S) + MARGIN_S
+
+
+def test_the_status_names_the_cause_and_what_mends_it(failed: FailedDrive) -> None:
+    status = failed.daemon.status()
+    assert (status["state"], status["bus"]["down"]) == ("fault", failed.failure.cause)
+    assert failed.failure.remedy in status["bus"]["remedy"]
+
+
+def test_once_that_is_done_the_robot_boots_by_itself_and_drives_after_a_reset(failed: FailedDrive) -> None:
+    failed.mend()
+    failed.daemon.wait_for(lambda status: "down" not in status["bus"] and all_ready(status))
+    assert failed.daemon.canhelm("reset").returncode == 0
+    assert drives(failed.daemon)

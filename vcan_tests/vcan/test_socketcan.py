@@ -360,7 +360,7 @@ async def test_bus_off_takes_the_bus_down_until_the_interface_was_restarted(capl
             adapter.report_state("bus-off", tx_errors=255)
             await until(lambda: bus.down)
             assert (bus.down, bus.details()["bus_offs"]) == ("bus-off", 1)
-            assert "ip link set can0 type can restart" in bus.details()["remedy"]
+            assert "ip link set can0 down" in bus.details()["remedy"]
             bus.send(0x202)
             assert bus.counters.dropped_stale == 1
             adapter.down()
