@@ -41,6 +41,8 @@ class CascadeTuning:
         bending_gain: rate of the bending angle over the way for its error [1/m].
         rate_share: part of the steering's rate that approaching a bending angle may use.
         lead_s: time by which errors are taken ahead.
+        preview_m: way by which the path's curvature is fed forward earlier, backwards with a trailer: about half of
+            what the bending angle needs to follow.
     """
 
     position_gain: float = 6.83
@@ -53,6 +55,7 @@ class CascadeTuning:
     bending_gain: float = 13.4
     rate_share: float = 0.7
     lead_s: float = 0.22
+    preview_m: float = 0.13
 
 
 class _Errors(NamedTuple):
@@ -99,9 +102,10 @@ class CascadeFollower(SectionFollower):
         piece = self._path.pieces[meeting.piece]
         errors = errors_on(piece, meeting, pose, bending_rad, self._hitch)
         lead_m = abs(speed_m_s) * self._tuning.lead_s
-        ahead, _ = self._path.ahead(self.section, meeting.piece, meeting.along_m + lead_m)
-        path_curvature = ahead.heading_curvature
         hitch = self._hitch if piece.backward else None
+        preview_m = 0.0 if hitch is None else self._tuning.preview_m
+        ahead, _ = self._path.ahead(self.section, meeting.piece, meeting.along_m + lead_m + preview_m)
+        path_curvature = ahead.heading_curvature
         now = _Errors(errors.position_m, errors.heading_rad, bending_rad)
         moved = _taken_ahead(now, hitch, self._vehicle.curvature(steering_rad), path_curvature, lead_m, piece.backward)
         heading, wanted = self._curvature(moved, path_curvature, piece.backward)

@@ -176,6 +176,10 @@ class Path:
         first, last = self.sections[section]
         return self._begin_m[last] + self.pieces[last].length_m - self._begin_m[first]
 
+    def section_end(self, piece: int) -> int:
+        """Last piece of the section that a piece belongs to."""
+        return self.sections[bisect_right(self.sections, piece, key=lambda section: section[0]) - 1][1]
+
     def remaining(self, section: int, piece: int, along_m: float) -> float:
         """Way from a point of a section to the section's end [m]; negative beyond it."""
         last = self.sections[section][1]

@@ -229,19 +229,20 @@ class PathFollower(SectionFollower):
         super().__init__(vehicle, path)
         self._tuning, self._published = tuning, published
 
-    def step(self, pose: Pose, bending_rad: float) -> FollowingStep:
+    def step(self, pose: Pose, bending_rad: float, look_ahead_m: float | None = None) -> FollowingStep:
         """One steering command.
 
         Args:
             pose: of the reference unit: driving forwards the truck's, backwards the trailer's.
             bending_rad: measured; without meaning for a truck alone.
+            look_ahead_m: of this step; None: that of the tuning.
 
         Raises:
             ValueError: a number is not finite.
         """
         meeting = self._meet(pose, bending_rad)
         piece = self._path.pieces[meeting.piece]
-        target = self._target(piece, meeting)
+        target = self._target(piece, meeting, self._tuning.look_ahead_m if look_ahead_m is None else look_ahead_m)
         curvature = published_circle_curvature(pose, target) if self._published else circle_curvature(pose, target)
         bending_target = None
         if piece.backward and self._hitch is not None:
@@ -252,8 +253,8 @@ class PathFollower(SectionFollower):
         errors = errors_on(piece, meeting, pose, bending_rad, self._hitch)
         return self._commanded(errors, curvature, wanted, target=target, bending_target_rad=bending_target)
 
-    def _target(self, piece: Piece, meeting: Meeting) -> Point:
+    def _target(self, piece: Piece, meeting: Meeting, look_ahead_m: float) -> Point:
         if self._published:
-            return published_target(piece, meeting.along_m, self._tuning.look_ahead_m)
-        ahead, along = self._path.ahead(self.section, meeting.piece, meeting.along_m + self._tuning.look_ahead_m)
+            return published_target(piece, meeting.along_m, look_ahead_m)
+        ahead, along = self._path.ahead(self.section, meeting.piece, meeting.along_m + look_ahead_m)
         return ahead.point(along)
