@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 from drivers.canopen.codes import NMT_COMMANDS, NMT_STATES
 from drivers.canopen.objects import ObjectDef, ObjectTable
@@ -14,6 +15,7 @@ from drivers.epos.codes import EMERGENCIES
 from drivers.epos.objects import OBJECTS as EPOS_OBJECTS
 from drivers.epos.state_machine import STATES, Mode, command_of, state_of
 from drivers.explain_codes import ABORTS, DICTIONARIES, Reading, code_reading, register_words, unknown_emcy, value_words
+from drivers.explain_services import block_reader, lss_reading
 
 _SdoReader = Callable[[str, bytes], Iterator[Reading]]
 """Title and the 8 bytes of an SDO frame -> readings."""
@@ -147,11 +149,6 @@ def _time_stamp(_data: bytes) -> Reading:
     return Reading("frame", "time stamp", "Time of day; the EPOS 24/5 does not use it.", source="CiA 301 7.2.6")
 
 
-def _lss(_data: bytes) -> Reading:
-    meaning = "Sets or asks node id and bit rate of devices that have it; the EPOS 24/5 does not."
-    return Reading("frame", "layer setting service", meaning, source="CiA 305")
-
-
 # Process data
 
 
@@ -231,13 +228,15 @@ def _error_control(node: int, data: bytes) -> Iterator[Reading]:
 # Service data
 
 
-def _sdo(sender: str, services: dict[int, _SdoReader]) -> Callable[[int, bytes], Iterator[Reading]]:
+def _sdo(
+    sender: str, services: dict[int, _SdoReader], otherwise: _SdoReader
+) -> Callable[[int, bytes], Iterator[Reading]]:
     def read(node: int, data: bytes) -> Iterator[Reading]:
         title = f"SDO {sender} node {node}"
         if len(data) != 8:
             yield Reading("frame", f"{title}, malformed", f"An SDO frame has 8 bytes, not {len(data)}.")
         else:
-            yield from services.get(data[0] >> 5, _block)(title, data)
+            yield from services.get(data[0] >> 5, otherwise)(title, data)
 
     return read
 
@@ -301,11 +300,6 @@ def _abort(title: str, data: bytes) -> Iterator[Reading]:
             yield Reading("frame", label, meaning, cure="Look the code up in the device's manual.", assumes=device)
 
 
-def _block(title: str, data: bytes) -> Iterator[Reading]:
-    meaning = "Block transfer or an unknown command; the EPOS 24/5 answers it with abort 0x05040001."
-    yield Reading("frame", f"{title}: command byte 0x{data[0]:02X}", meaning, source="CiA 301 7.2.4.3")
-
-
 _SDO_REQUESTS: dict[int, _SdoReader] = {
     0: _segment("write segment", carries_data=True),
     1: _with_object("write", show_value=True),
@@ -326,8 +320,8 @@ _BROADCASTS: dict[int, Callable[[bytes], Reading]] = {
     0x000: _nmt_command,
     0x080: _sync,
     0x100: _time_stamp,
-    0x7E4: _lss,
-    0x7E5: _lss,
+    0x7E4: partial(lss_reading, 0x7E4),
+    0x7E5: partial(lss_reading, 0x7E5),
 }
 _PDO_NAMES = {
     **{0x080 + 0x100 * number: f"TPDO{number}" for number in (1, 2, 3, 4)},
@@ -335,7 +329,7 @@ _PDO_NAMES = {
 }
 _SERVICES: dict[int, Callable[[int, bytes], Iterator[Reading]]] = {
     0x080: _emergency,
-    0x580: _sdo("answer of", _SDO_ANSWERS),
-    0x600: _sdo("request to", _SDO_REQUESTS),
+    0x580: _sdo("answer of", _SDO_ANSWERS, block_reader(answer=True)),
+    0x600: _sdo("request to", _SDO_REQUESTS, block_reader(answer=False)),
     0x700: _error_control,
 }
