@@ -86,7 +86,7 @@ class App:
         self._record = record
         self.recorder: CandumpRecorder | None = None
         self.master = Master(self.bus, profile.network)
-        self.devices = Devices(self.master, profile)
+        self.devices = Devices(self.master, profile, wire.bricks)
         self.vehicle = make_vehicle(profile, self.devices)
         period_s = 1.0 / profile.network.cycle_hz
         late = profile.network.late_after_cycles
@@ -94,7 +94,7 @@ class App:
         self.cycle = Cycle(
             self.master, self.devices, period_s, self.supervisor.step, wire.pace, wire.reading_share, late
         )
-        commands = Commands(self.supervisor, self._switch_power if self.network else None)
+        commands = Commands(self.supervisor, self.network)
         self.service = Service(profile.name, self.supervisor, commands, self.bus, self.cycle)
         self.server = self._serve(socket) if socket else None
         self.gateway = self._serve_tools(gateway) if gateway else None
@@ -114,13 +114,6 @@ class App:
             writable=access.writable,
             inherited=self._inherited.get(access.path),
         )
-
-    def _switch_power(self, node: int | str, on: bool) -> None:
-        assert self.network is not None
-        if on:
-            self.network.power_on(node)
-        else:
-            self.network.power_off(node)
 
     async def start(self) -> None:
         """Open the sockets first, then the bus; everything else comes up by itself.

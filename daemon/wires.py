@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import re
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 from canhelm.errors import UsageError
+from daemon.brick_ports import brick_port, is_brick_port
 from daemon.runtime.clock import Ticker, VirtualTimeLoop
 from daemon.runtime.cycle import Pace
 from daemon.runtime.pace import LinePace
@@ -16,7 +17,9 @@ from daemon.runtime.sync_pace import SyncPace
 from drivers.bus.broadcast_manager import kernel_repeats
 from drivers.bus.contract import Bus
 from drivers.bus.interfaces import open_bus
+from drivers.bus.no_bus import NoBus
 from drivers.bus.socketcan import SocketCanBus
+from drivers.devices import Connect
 from drivers.encoder.objects import OBJECTS as ENCODER_OBJECTS
 from drivers.epos.serial_bus import SerialGatewayBus
 from drivers.epos.serial_conversation import Transport
@@ -46,6 +49,7 @@ class Wire:
         cable: the simulated serial cable, where there is one.
         pace: makes what ticks the control cycle, from period and callback.
         reading_share: share of a cycle that its readings may take.
+        bricks: ways to the profile's NXT bricks, by their names.
     """
 
     bus: Bus
@@ -55,20 +59,45 @@ class Wire:
     cable: SerialCable | None = None
     pace: Callable[[float, Callable[[], None]], Pace] = Ticker
     reading_share: float = 0.5
+    bricks: Mapping[str, Connect] = field(default_factory=dict)
 
 
 def make_wire(spec: str, profile: Profile, seed: int) -> Wire:
     """The way to a robot that a SPEC names.
 
     Args:
-        spec: ``simulated``; ``rs232`` for a simulated drive on a simulated serial line; ``rs232:DEVICE[@BAUD]``; or
-            ``INTERFACE:CHANNEL`` of python-can.
+        spec: ``simulated``; ``rs232`` for a simulated drive on a simulated serial line; ``rs232:DEVICE[@BAUD]``;
+            ``INTERFACE:CHANNEL`` of python-can; for a robot with nothing on CAN ``serial:DEVICE`` or ``usb`` for its
+            brick, or ``none`` for all bricks as the profile says.
         profile: the robot.
         seed: of everything random in a simulated network.
 
     Raises:
         UsageError: a SPEC that means nothing.
     """
+    if spec == "none" or is_brick_port(spec):
+        return _brick_wire(spec, profile)
+    wire = _bus_wire(spec, profile, seed)
+    if wire.network is not None:
+        links = {name: twin.link.connect for name, twin in wire.network.bricks.items()}
+        return replace(wire, bricks=links)
+    return replace(wire, bricks={name: brick_port(brick.port) for name, brick in profile.bricks.items()})
+
+
+def _brick_wire(spec: str, profile: Profile) -> Wire:
+    """A robot of bricks only. Raises UsageError."""
+    if profile.drives or profile.encoders:
+        remedy = "give the CAN bus; the ports of its bricks stand in the profile"
+        raise UsageError(f"{spec!r} is no bus, and robot {profile.name} has nodes on one", value=spec, remedy=remedy)
+    ports = {name: brick.port for name, brick in profile.bricks.items()}
+    if spec != "none" and len(ports) != 1:
+        remedy = "give none; the port of each brick stands in the profile"
+        raise UsageError(f"{spec!r} is the way to one brick, and there are {len(ports)}", value=spec, remedy=remedy)
+    connects = {name: brick_port(port if spec == "none" else spec) for name, port in ports.items()}
+    return Wire(NoBus(profile.network.bit_rate), profile, bricks=connects)
+
+
+def _bus_wire(spec: str, profile: Profile, seed: int) -> Wire:
     if spec == "simulated":
         medium = SimulatedBus(bit_rate=profile.network.bit_rate, name="vcan0")
         network = SimulatedNetwork(profile, medium, seed)
@@ -76,6 +105,11 @@ def make_wire(spec: str, profile: Profile, seed: int) -> Wire:
     serial = _RS232.fullmatch(spec)
     if serial is None:
         return _can_wire(open_bus(spec, profile.network.bit_rate), profile)
+    if not profile.drives:
+        remedy = "give serial:/dev/rfcomm0, usb, or simulated"
+        raise UsageError(
+            f"robot {profile.name} has no EPOS that {spec} could be the line of", value=spec, remedy=remedy
+        )
     baud = _baud(spec, serial["baud"])
     if serial["colon"] is None:
         return _simulated_serial(profile, baud, seed)
@@ -123,7 +157,10 @@ def _serial_wire(
     shrunk = serial_profile(profile, baud)
     encoders = {encoder.node: ENCODER_OBJECTS for encoder in profile.encoders.values()}
     gateway = profile.drives[gateway_of(profile)].node
-    bus = SerialGatewayBus(name, connect, baud, profile.network.bit_rate, gateway, encoders, facts(profile, baud))
+    inputs = frozenset(drive.node for drive in profile.drives.values() if drive.emergency_stop)
+    bus = SerialGatewayBus(
+        name, connect, baud, profile.network.bit_rate, gateway, encoders, inputs, facts(profile, baud)
+    )
     late = shrunk.network.late_after_cycles
     return Wire(
         bus,

@@ -67,13 +67,24 @@ class Device(Protocol):
     """What every device on a wire has."""
 
     name: str
-    node: int
-    node_state: NodeState
-    status_sentence: str
-    """What the master is doing about the node, or what is wrong with it, for people."""
     fault: Fault | None
     reading_time_s: float
     """Loop time of the last reading; ``-inf`` before the first."""
+
+    @property
+    def node(self) -> int | None:
+        """Its node id; None for what is not on CAN."""
+        ...
+
+    @property
+    def node_state(self) -> NodeState:
+        """Where it stands in its boot-up."""
+        ...
+
+    @property
+    def status_sentence(self) -> str:
+        """What is being done about it, or what is wrong with it, for people."""
+        ...
 
     def require_ready(self) -> None:
         """Raise NodeAbsent or NotReady unless the node is configured, started and guarded."""
@@ -91,12 +102,21 @@ class Drive(Device, Protocol):
     DeviceFault, NotReady, Aborted, NodeAbsent or Timeout, with node, object and remedy.
     """
 
-    state: DriveState
     position_m: float
     """Distance that the wheel has rolled since the daemon knows the node."""
     speed_m_s: float
     current_a: float
     target_speed_m_s: float
+
+    @property
+    def state(self) -> DriveState:
+        """What it does."""
+        ...
+
+    @property
+    def emergency_stop(self) -> str:
+        """Why the drive demands an emergency stop: a contact at one of its inputs; empty where it does not."""
+        ...
 
     def command_speed(self, speed_m_s: float) -> None:
         """Take a target speed at the rim for the next ``transmit``."""

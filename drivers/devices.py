@@ -3,40 +3,54 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 
 from canhelm.errors import CanhelmError
 from drivers.canopen.boot import NodeBoot
 from drivers.canopen.device import CanopenDevice
 from drivers.canopen.master import Master
-from drivers.contract import Accelerometer, Brake, Drive, NodeState, SteeringEncoder
+from drivers.contract import Accelerometer, Brake, Device, Drive, NodeState, SteeringEncoder
 from drivers.encoder.encoder import Cia406Encoder
 from drivers.epos.accelerometer import AnalogAccelerometer
 from drivers.epos.brake import EposBrake
 from drivers.epos.drive import EposDrive
 from drivers.epos.gateway_drive import GatewayDrive
+from drivers.nxt.brick import Brick, BrickSettings, OnLost
+from drivers.nxt.line import Port
+from drivers.nxt.motors import MotorCycle, NxtDrive
+from profiles.bricks import BrickConfig
 from profiles.schema import DriveConfig, Profile
 
 LOGGER = logging.getLogger("canhelm")
+Connect = Callable[[OnLost], Port]
+"""Makes the connection to a brick; raises BusOff where there is none to be had."""
 
 
 class Devices:
-    """Every drive, encoder and brake of a profile, each node with its boot-up.
+    """Every drive, encoder, brake and brick of a profile, each node with its boot-up.
 
     Args:
         master: the master of their bus.
         profile: the robot.
+        connect: the ways to its bricks, by their names.
 
     Attributes:
-        drives, encoders, brakes: by their names in the profile.
+        drives, encoders, brakes, bricks: by their names in the profile; motors of bricks are drives, too.
         accelerometer: None where the profile has none.
         by_node: drives and encoders by node id.
+        all: those, and then the motors of bricks.
     """
 
-    def __init__(self, master: Master, profile: Profile) -> None:
+    def __init__(self, master: Master, profile: Profile, connect: Mapping[str, Connect] = {}) -> None:
         drives = {name: _drive(master, name, config) for name, config in profile.drives.items()}
         encoders = {name: Cia406Encoder(master, name, config) for name, config in profile.encoders.items()}
-        self.drives: dict[str, Drive] = dict(drives)
+        self.bricks = {name: _brick(name, config, connect[name]) for name, config in profile.bricks.items()}
+        motors = {
+            name: NxtDrive(name, self.bricks[brick], config, brick)
+            for brick, owner in profile.bricks.items()
+            for name, config in owner.motors.items()
+        }
+        self.drives: dict[str, Drive] = {**drives, **motors}
         self.encoders: dict[str, SteeringEncoder] = dict(encoders)
         self.brakes: dict[str, Brake] = {
             name: EposBrake(name, config, drives[config.drive]) for name, config in profile.brakes.items()
@@ -48,7 +62,12 @@ class Devices:
         self.by_node: dict[int, CanopenDevice] = {
             device.node: device for device in (*drives.values(), *encoders.values())
         }
+        self.all: tuple[Device, ...] = (*self.by_node.values(), *motors.values())
         self._boots = [NodeBoot(master, device) for device in self.by_node.values()]
+        self._motor_cycles = [
+            MotorCycle(brick, [motor for motor in motors.values() if motor.brick is brick])
+            for brick in self.bricks.values()
+        ]
 
     @property
     def on_reading(self) -> Callable[[int], None] | None:
@@ -61,12 +80,14 @@ class Devices:
             device.on_reading = callback
 
     def start(self) -> None:
-        """Start the boot-up of every node, on the running loop."""
+        """Start the boot-up of every node and the connections to the bricks, on the running loop."""
         for boot in self._boots:
             boot.start()
+        for motors in self._motor_cycles:
+            motors.start()
 
     async def close(self) -> None:
-        """Engage the brakes, end life guarding where drives are off, and end the boot-ups."""
+        """Engage the brakes, end life guarding where drives are off, and end boot-ups and connections."""
         for brake in self.brakes.values():
             if self.drives[brake.drive].node_state is NodeState.READY:
                 await _as_far_as_possible(brake.engage)
@@ -75,12 +96,19 @@ class Devices:
                 await _as_far_as_possible(device.before_close)
         for boot in self._boots:
             await boot.close()
+        for motors in self._motor_cycles:
+            await motors.close()
 
 
 def _drive(master: Master, name: str, config: DriveConfig) -> EposDrive:
     if config.mode == "expiring_position":
         return GatewayDrive(master, name, config)
     return EposDrive(master, name, config)
+
+
+def _brick(name: str, config: BrickConfig, connect: Connect) -> Brick:
+    settings = BrickSettings(warn_v=config.battery_warning_v, refuse_v=config.battery_refusal_v)
+    return Brick(name, connect, settings)
 
 
 async def _as_far_as_possible(closing: Callable[[], Awaitable[None]]) -> None:

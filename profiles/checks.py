@@ -14,8 +14,8 @@ from profiles.schema import SCHEMA_VERSION
 
 REFERENCES = {"wheels": "drives", "encoders": "encoders", "brakes": "brakes"}
 """Lists of names, or mappings by name, in ``vehicle`` and the part that defines the names."""
-STEERING = {"drive": "drives", "encoder": "encoders"}
-"""Names in ``vehicle.steering``, likewise."""
+SINGLE = {("steering", "drive"): "drives", ("steering", "encoder"): "encoders", ("trailer", "encoder"): "encoders"}
+"""Single names in parts of ``vehicle``, likewise."""
 NEEDED = {
     "paired_steer": (
         ("limits", "steering_rim_speed_m_s"),
@@ -25,6 +25,11 @@ NEEDED = {
         ("simulation", "brake_holding_torque_n_m"),
     ),
     "ackermann": (
+        ("limits", "lateral_acceleration_m_s2"),
+        ("simulation", "steering_inertia_kg_m2"),
+        ("simulation", "steering_friction_n_m"),
+    ),
+    "semitrailer": (
         ("limits", "lateral_acceleration_m_s2"),
         ("simulation", "steering_inertia_kg_m2"),
         ("simulation", "steering_friction_n_m"),
@@ -67,10 +72,18 @@ class Finding:
         return Mistake(place, dotted(path), what, self.remedy)
 
 
-def findings(data: dict[str, Any]) -> Iterator[Finding]:
-    """Everything that does not fit together in a profile's plain data."""
+def findings(data: dict[str, Any], complete: bool = True) -> Iterator[Finding]:
+    """Everything that does not fit together in a profile's plain data.
+
+    Args:
+        data: the profile.
+        complete: False where a file that it extends could not be read, and may have given what is missing.
+    """
+    if complete and data.get("drives", {}) == data.get("bricks", {}) == {}:
+        yield Finding(("drives",), "is missing, and so is bricks", "write drives: or bricks: with a mapping")
     yield from _version(data)
     yield from _node_ids(data)
+    yield from _motors(data)
     yield from _vehicle_names(data)
     yield from _needed(data)
     yield from _brakes(data)
@@ -108,11 +121,33 @@ def _node_ids(data: dict[str, Any]) -> Iterator[Finding]:
             yield Finding(path, f"node id {node} is taken by {{other}}", "give each its own", other=first[node])
 
 
+def _motors(data: dict[str, Any]) -> Iterator[Finding]:
+    """Motors of bricks: each name once in the robot, each output once in its brick."""
+    places: dict[str, FieldPath] = {name: ("drives", name) for name in part(data, "drives")}
+    for brick in part(data, "bricks"):
+        used: dict[Any, FieldPath] = {}
+        for name, motor in part(part(part(data, "bricks"), brick), "motors").items():
+            path, output = ("bricks", brick, "motors", name), motor.get("output") if isinstance(motor, dict) else None
+            if places.setdefault(name, path) != path:
+                yield Finding(path, "has the name of {other}", "give each its own", other=places[name])
+            if output is not None and used.setdefault(output, path) != path:
+                what = f"output {output} is taken by {{other}}"
+                yield Finding((*path, "output"), what, "give each its own", other=used[output])
+
+
+def _wheels(data: dict[str, Any]) -> dict[str, Any] | None:
+    """What may be a wheel of the vehicle: drives on CAN, and on two wheels motors of bricks, too."""
+    drives, bricks = _defined(data, "drives"), part(data, "bricks")
+    if part(data, "vehicle").get("type") != "differential" or not bricks:
+        return drives
+    return (drives or {}) | {name: motor for brick in bricks for name, motor in part(bricks[brick], "motors").items()}
+
+
 def _vehicle_names(data: dict[str, Any]) -> Iterator[Finding]:
     for key, kind in REFERENCES.items():
         given = part(data, "vehicle").get(key)
         names = _names(part(data, "vehicle"), key)
-        known = _defined(data, kind)
+        known = _wheels(data) if key == "wheels" else _defined(data, kind)
         for index, name in enumerate(names):
             path = ("vehicle", key, name if isinstance(given, dict) else index)
             if known is not None and name not in known:
@@ -124,8 +159,8 @@ def _vehicle_names(data: dict[str, Any]) -> Iterator[Finding]:
 
 def _steering(data: dict[str, Any]) -> Iterator[Finding]:
     vehicle, steering = part(data, "vehicle"), part(part(data, "vehicle"), "steering")
-    for key, kind in STEERING.items():
-        name, path, known = steering.get(key), ("vehicle", "steering", key), _defined(data, kind)
+    for (where, key), kind in SINGLE.items():
+        name, path, known = part(vehicle, where).get(key), ("vehicle", where, key), _defined(data, kind)
         if isinstance(name, str) and known is not None and name not in known:
             yield _unknown(path, kind, name, known)
     if steering.get("drive") in _names(vehicle, "wheels"):
@@ -213,11 +248,10 @@ def _unused(data: dict[str, Any]) -> Iterator[Finding]:
     vehicle = part(data, "vehicle")
     if not vehicle:
         return
-    steering = part(vehicle, "steering")
-    steered = {kind: steering[key] for key, kind in STEERING.items() if key in steering}
+    single = [(kind, part(vehicle, where).get(key)) for (where, key), kind in SINGLE.items()]
     for key, kind in REFERENCES.items():
-        names = [*_names(vehicle, key), steered.get(kind)]
+        named = [name for of_kind, name in single if of_kind == kind and name is not None]
         for name in part(data, kind):
-            if (key in vehicle or kind in steered) and name not in names:
+            if (key in vehicle or named) and name not in (*_names(vehicle, key), *named):
                 what = f"is not named in vehicle.{key}"
                 yield Finding((kind, name), what, "the vehicle's motions do not use it", warning=True)

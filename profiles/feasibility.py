@@ -14,20 +14,20 @@ from typing import Any, TypeVar
 
 import msgspec
 
+from profiles.bricks import NxtMotorConfig
 from profiles.checks import Finding, part
+from profiles.parts import Part
 from profiles.schema import (
-    CarGeometry,
+    BodyGeometry,
     DriveConfig,
     EncoderConfig,
-    Geometry,
     Limits,
     Network,
     OmniGeometry,
     PairedSteerGeometry,
-    Part,
     SimulationConfig,
-    SteeredAxle,
 )
+from profiles.steered import CarGeometry, SemitrailerGeometry, SteeredAxle
 
 GRAVITY_M_S2 = 9.81
 VOLTAGE_SHARE = 0.9
@@ -38,7 +38,9 @@ CURRENT_RATIO = 2.0
 """Output current limit over continuous current limit (Firmware Specification 14.1.57 recommends twice)."""
 BUS_SHARE = 0.7
 """Share of a cycle that SYNC and the PDOs may take; the rest is left to guarding, SDO and emergency messages."""
-RPDO_BYTES, TPDO_BYTES, ENCODER_BYTES, ANALOG_BYTES = 6, 8, 4, 4
+BRICK_FULL_SPEED_DEG_S = 1000.0
+"""Speed that an NXT brick regulates to at power 100 (LEGO firmware)."""
+RPDO_BYTES, TPDO_BYTES, ENCODER_BYTES, INPUT_BYTES = 6, 8, 4, 6
 OMNI_SHARE = 2.0
 """Mass that an omni-wheel pushes along its direction, over its share of the mass: wheels that stand evenly about the
 robot have the best force in their own direction, sum of cos^2 = n/2, and each of n does 2/n of the work."""
@@ -68,7 +70,7 @@ def findings(data: dict[str, Any]) -> Iterator[Finding]:
     encoders = {name: _valid(value, EncoderConfig) for name, value in part(data, "encoders").items()}
     drives = {name: _valid(value, DriveConfig) for name, value in part(data, "drives").items()}
     load = _load(vehicle, simulation)
-    steering = vehicle.steering if isinstance(vehicle, CarGeometry) else None
+    steering = vehicle.steering if isinstance(vehicle, CarGeometry | SemitrailerGeometry) else None
     if vehicle is not None and data.get("simulation") is None:
         yield Finding(
             ("vehicle",), "no tyre data: ramps are not checked against friction", "add simulation:", warning=True
@@ -82,9 +84,11 @@ def findings(data: dict[str, Any]) -> Iterator[Finding]:
             else:
                 yield from _drive(("drives", name), drive, supply_v, load)
                 yield from _limits_of_drive(limits, drive, name)
+    for brick in part(data, "bricks"):
+        yield from _brick_motors(limits, ("bricks", brick, "motors"), part(part(part(data, "bricks"), brick), "motors"))
     yield from _limits(limits, vehicle, encoders)
-    analog = sum(drive is not None and drive.analog_inputs for drive in drives.values())
-    yield from _bus(_valid(data.get("network", {}), Network), len(drives), len(encoders), analog)
+    telling = sum(drive is not None and drive.tells_inputs for drive in drives.values())
+    yield from _bus(_valid(data.get("network", {}), Network), len(drives), len(encoders), telling)
 
 
 def _valid(value: Any, kind: type[T]) -> T | None:
@@ -95,27 +99,33 @@ def _valid(value: Any, kind: type[T]) -> T | None:
         return None
 
 
-def _vehicle(value: Any) -> Geometry | None:
-    kinds: dict[str, type[Geometry]] = {kind.type: kind for kind in (PairedSteerGeometry, OmniGeometry, CarGeometry)}
+def _vehicle(value: Any) -> BodyGeometry | None:
+    kinds: dict[str, type[BodyGeometry]] = {
+        kind.type: kind for kind in (PairedSteerGeometry, OmniGeometry, CarGeometry, SemitrailerGeometry)
+    }
     kind = kinds.get(str(value.get("type"))) if isinstance(value, dict) else None
     return None if kind is None else _valid(value, kind)
 
 
-def _load(vehicle: Geometry | None, simulation: SimulationConfig | None) -> Load | None:
+def _load(vehicle: BodyGeometry | None, simulation: SimulationConfig | None) -> Load | None:
     if vehicle is None:
         return None
-    share_kg = vehicle.mass_kg / len(vehicle.wheels)
-    pushed_kg = OMNI_SHARE * share_kg if isinstance(vehicle, OmniGeometry) else share_kg
-    weight_n = (_driven_kg(vehicle) if isinstance(vehicle, CarGeometry) else share_kg) * GRAVITY_M_S2
+    pushed_kg, carried_kg = _moved_and_carried_kg(vehicle)
+    weight_n = carried_kg * GRAVITY_M_S2
     if simulation is None:
         return Load(pushed_kg, weight_n, wheel_inertia_kg_m2=0.0, friction=math.inf, rolling_resistance=0.0)
     tyre = simulation.tyre
     return Load(pushed_kg, weight_n, simulation.wheel_inertia_kg_m2, tyre.friction, tyre.rolling_resistance)
 
 
-def _driven_kg(vehicle: CarGeometry) -> float:
-    """Mass that stands on one of the two rear wheels."""
-    return vehicle.mass_kg * (1.0 - vehicle.mass_offset_m / vehicle.wheelbase_m) / len(vehicle.wheels)
+def _moved_and_carried_kg(vehicle: BodyGeometry) -> tuple[float, float]:
+    """What of the vehicle's mass a driven wheel pushes, and what stands on it."""
+    if isinstance(vehicle, SemitrailerGeometry):
+        return vehicle.mass_kg + vehicle.trailer.mass_kg, vehicle.driven_axle_kg
+    share_kg = vehicle.mass_kg / len(vehicle.wheels)
+    if isinstance(vehicle, CarGeometry):
+        return share_kg, share_kg * (1.0 - vehicle.mass_offset_m / vehicle.wheelbase_m)
+    return (OMNI_SHARE * share_kg if isinstance(vehicle, OmniGeometry) else share_kg), share_kg
 
 
 def _steering_load(simulation: SimulationConfig | None) -> Load:
@@ -202,8 +212,20 @@ def _steering_limits(steering: SteeredAxle, drive: DriveConfig, name: str) -> It
     yield from _at_most(path, steering.acceleration_deg_s2, ramp, "deg/s^2", reason)
 
 
+def _brick_motors(limits: Limits | None, path: tuple[str, ...], motors: dict[str, Any]) -> Iterator[Finding]:
+    for name, value in motors.items():
+        motor = _valid(value, NxtMotorConfig)
+        if motor is None:
+            continue
+        allowed = math.radians(BRICK_FULL_SPEED_DEG_S) * motor.wheel_radius_m
+        yield from _at_most((*path, name, "max_speed_m_s"), motor.max_speed_m_s, allowed, "m/s", "the brick regulates")
+        if limits is not None:
+            wheel, place = limits.wheel_speed_m_s, ("limits", "wheel_speed_m_s")
+            yield from _at_most(place, wheel, motor.max_speed_m_s, "m/s", f"motor {name} allows")
+
+
 def _limits(
-    limits: Limits | None, vehicle: Geometry | None, encoders: dict[str, EncoderConfig | None]
+    limits: Limits | None, vehicle: BodyGeometry | None, encoders: dict[str, EncoderConfig | None]
 ) -> Iterator[Finding]:
     if limits is None:
         return
@@ -211,7 +233,7 @@ def _limits(
     yield from _at_most(("limits", "speed_m_s"), limits.speed_m_s, wheel_m_s, "m/s", "the wheels' limit is")
     if isinstance(vehicle, OmniGeometry):
         yield from _omni_limits(limits, vehicle)
-    if isinstance(vehicle, OmniGeometry | CarGeometry):
+    if isinstance(vehicle, OmniGeometry | CarGeometry | SemitrailerGeometry):
         return
     path = ("limits", "steering_rim_speed_m_s")
     yield from _at_most(path, limits.steering_rim_speed_m_s, wheel_m_s, "m/s", "the wheels' limit is")
@@ -253,13 +275,13 @@ def _worst_frame_bits(data_bytes: int) -> int:
     return 47 + 8 * data_bytes + (33 + 8 * data_bytes) // 4
 
 
-def _bus(network: Network | None, drives: int, encoders: int, analog: int) -> Iterator[Finding]:
-    """SYNC, one RPDO and one TPDO a drive, one more where it tells analog inputs, and one an encoder have to fit."""
+def _bus(network: Network | None, drives: int, encoders: int, telling: int) -> Iterator[Finding]:
+    """SYNC, one RPDO and one TPDO a drive, one more where it tells its inputs, and one an encoder have to fit."""
     if network is None:
         return
     bits = _worst_frame_bits(0) + encoders * _worst_frame_bits(ENCODER_BYTES)
     bits += drives * (_worst_frame_bits(RPDO_BYTES) + _worst_frame_bits(TPDO_BYTES))
-    bits += analog * _worst_frame_bits(ANALOG_BYTES)
+    bits += telling * _worst_frame_bits(INPUT_BYTES)
     allowed = BUS_SHARE * network.bit_rate / bits
     yield from _at_most(("network", "cycle_hz"), network.cycle_hz, allowed, "Hz", "the bit rate allows")
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import msgspec
 
-from profiles import schema
+from profiles import bricks, schema
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _NAME = {"type": "string"}
@@ -51,8 +51,8 @@ def _allow_extends(node: Any) -> None:
 
 def _descriptions() -> dict[str, dict[str, str]]:
     """Docstring of every field, by class and field."""
-    tree = ast.parse(inspect.getsource(schema))
-    classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]
+    trees = [ast.parse(inspect.getsource(module)) for module in (schema, bricks)]
+    classes = [node for tree in trees for node in tree.body if isinstance(node, ast.ClassDef)]
     return {node.name: _field_descriptions(node) for node in classes}
 
 

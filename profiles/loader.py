@@ -206,7 +206,7 @@ def _checked(tree: Node | None, mistakes: list[Mistake]) -> tuple[Profile | None
     if not isinstance(tree, Mapping):
         return None, []
     data = Shape(mistakes).walk(tree, _PROFILE_TYPE)
-    findings = [*checks.findings(data), *feasibility.findings(data)]
+    findings = [*checks.findings(data, tree.complete), *feasibility.findings(data)]
     warnings = [finding.located(tree) for finding in findings if finding.warning]
     mistakes += [finding.located(tree) for finding in findings if not finding.warning]
     return None if mistakes else msgspec.convert(data, Profile), warnings

@@ -12,23 +12,19 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal
 
-import msgspec
-from msgspec import Meta
+from msgspec import Meta, field
+
+from profiles.bricks import BrickConfig, DifferentialGeometry, NxtMotorConfig
+from profiles.parts import Name, NotNegative, Part, Positive
+from profiles.sensors import AngleCalibration, SensorDefects
+from profiles.steered import CarGeometry, SemitrailerGeometry
 
 SCHEMA_VERSION = 1
 
 NodeId = Annotated[int, Meta(ge=1, le=127)]
-Name = Annotated[str, Meta(pattern="^[A-Za-z][A-Za-z0-9_-]*$", max_length=40)]
-"""Begins with a letter: commands take a node id or a name."""
-Positive = Annotated[float, Meta(gt=0)]
-NotNegative = Annotated[float, Meta(ge=0)]
 Efficiency = Annotated[float, Meta(gt=0, le=1)]
 Counts = Annotated[int, Meta(ge=0, le=2**32 - 1)]
 Gain = Annotated[int, Meta(ge=0, le=32767)]
-
-
-class Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Common base: unknown keys are errors, values do not change."""
 
 
 class Network(Part, frozen=True, kw_only=True):
@@ -141,6 +137,11 @@ class DriveConfig(Part, frozen=True, kw_only=True):
     """A contact that stops the whole vehicle."""
 
     @property
+    def tells_inputs(self) -> bool:
+        """Whether it sends TPDO2, with its inputs."""
+        return self.analog_inputs or self.emergency_stop is not None
+
+    @property
     def qc_per_motor_turn(self) -> int:
         """Quad counts per motor turn."""
         return 4 * self.encoder_pulses_per_turn
@@ -163,6 +164,8 @@ class EncoderConfig(Part, frozen=True, kw_only=True):
     """1: counts grow when the pair turns counter-clockwise."""
     zero_counts: Counts = 0
     """Position value at heading 0."""
+    calibration: AngleCalibration | None = None
+    """What `canhelm calibrate` found; None: the counts are right."""
 
 
 class BrakeConfig(Part, frozen=True, kw_only=True):
@@ -243,53 +246,9 @@ class OmniGeometry(Part, frozen=True, kw_only=True, tag_field="type", tag="omni"
     """By the names of their drives, in the order of the loops."""
 
 
-class SteeredAxle(Part, frozen=True, kw_only=True):
-    """An axle whose wheels a motor of its own steers, also while they roll."""
-
-    drive: str
-    """Name of the drive that turns it. Its wheel radius is the arm at which its speeds and ramps count."""
-    encoder: str
-    """Name of the encoder that tells its angle."""
-    limit_deg: Annotated[float, Meta(gt=0, lt=90)]
-    """Steering angle that commands may ask for, to each side."""
-    stop_deg: Annotated[float, Meta(gt=0, lt=90)]
-    """Steering stops."""
-    rate_deg_s: Positive
-    acceleration_deg_s2: Positive
-
-
-class RegulatorGains(Part, frozen=True, kw_only=True):
-    """Gains of a PID regulator: of the error, its integral and its derivative."""
-
-    proportional: NotNegative
-    integral: NotNegative = 0.0
-    derivative: NotNegative = 0.0
-
-
-class CarGeometry(Part, frozen=True, kw_only=True, tag_field="type", tag="ackermann"):
-    """Geometry and body of a car with front-wheel steering and two driven rear wheels (ENPM808X report, section 4)."""
-
-    type: ClassVar[str] = "ackermann"
-    mass_kg: Positive
-    yaw_inertia_kg_m2: Positive
-    centre_of_mass_height_m: NotNegative = 0.0
-    wheelbase_m: Positive
-    """L: distance between the axles."""
-    track_m: Positive
-    """W: distance between the wheels of an axle."""
-    mass_offset_m: NotNegative
-    """a: of the centre of mass forward of the rear axle."""
-    wheels: tuple[str, str]
-    """Names of the drives of the rear wheels: left, right."""
-    steering: SteeredAxle
-    """The front axle; its angle is that of a wheel between the two front ones (gamma)."""
-    heading_regulator: RegulatorGains
-    """Steering angle [rad] for an error of heading [rad]."""
-    speed_regulator: RegulatorGains
-    """Acceleration of the wheels [rad/s^2] for an error of speed [m/s]."""
-
-
-Geometry = PairedSteerGeometry | OmniGeometry | CarGeometry
+BodyGeometry = PairedSteerGeometry | OmniGeometry | CarGeometry | SemitrailerGeometry
+"""Those whose mass the drives have to move."""
+Geometry = BodyGeometry | DifferentialGeometry
 
 
 class Limits(Part, frozen=True, kw_only=True):
@@ -311,6 +270,19 @@ class Limits(Part, frozen=True, kw_only=True):
     yaw_acceleration_deg_s2: Positive = 45.0
     lateral_acceleration_m_s2: Positive = 2.0
     """Of a vehicle that steers while it rolls; the faster it goes, the less it steers."""
+    jerk_m_s3: Positive | None = None
+    """Of ``drive to``: how fast its acceleration may change; None: at once."""
+
+
+class TractionConfig(Part, frozen=True, kw_only=True):
+    """What the traction loop has to know of drives and wheels. Motor data, mass and inertia stand elsewhere."""
+
+    response_s: NotNegative
+    """Time constant with which the drives follow a new target velocity."""
+    wheel_inertia_kg_m2: NotNegative
+    """Of one wheel alone."""
+    rolling_resistance_n: NotNegative
+    """Of one wheel, at its rim."""
 
 
 class Tyre(Part, frozen=True, kw_only=True):
@@ -363,26 +335,42 @@ class SimulationConfig(Part, frozen=True, kw_only=True):
     """Coefficient of rolling resistance of an omni-wheel's rollers, against motion across the wheel."""
     accelerometer_noise_m_s2: NotNegative = 0.0
     """Standard deviation of one reading of the accelerometer."""
-    floor: dict[Name, FloorPatch] = {}
+    floor: dict[Name, FloorPatch] = field(default_factory=dict)
     """Patches of another friction than the tyre's, the last one on top; for omni-wheels."""
+    sensors: dict[Name, SensorDefects] = field(default_factory=dict)
+    """By the names of their encoders; the others are without fault."""
 
 
 class Profile(Part, frozen=True, kw_only=True):
-    """A robot: network, drives, encoders, brakes, accelerometer, vehicle, limits, simulation."""
+    """A robot: network, drives, bricks, encoders, brakes, accelerometer, vehicle, limits, traction, simulation."""
 
     schema_version: int
     name: Name
     """Name of the robot; its socket is called after it. Left out: the name of its file."""
     description: str = ""
     network: Network = Network()
-    drives: Annotated[dict[Name, DriveConfig], Meta(min_length=1)]
-    encoders: dict[Name, EncoderConfig] = {}
-    brakes: dict[Name, BrakeConfig] = {}
+    drives: dict[Name, DriveConfig] = field(default_factory=dict)
+    bricks: dict[Name, BrickConfig] = field(default_factory=dict)
+    """NXT bricks, each with a connection of its own beside the CAN bus."""
+    encoders: dict[Name, EncoderConfig] = field(default_factory=dict)
+    brakes: dict[Name, BrakeConfig] = field(default_factory=dict)
     accelerometer: AccelerometerConfig | None = None
     vehicle: Geometry | None = None
     limits: Limits
+    traction: TractionConfig | None = None
+    """None: slip of the wheels is not answered."""
     simulation: SimulationConfig | None = None
 
     def drive_of_node(self, node: int) -> str | None:
         """Name of the drive with this node id."""
         return next((name for name, drive in self.drives.items() if drive.node == node), None)
+
+    @property
+    def motors(self) -> dict[str, NxtMotorConfig]:
+        """Motors of all bricks by their names."""
+        return {name: motor for brick in self.bricks.values() for name, motor in brick.motors.items()}
+
+    @property
+    def wheels(self) -> dict[str, DriveConfig | NxtMotorConfig]:
+        """Everything that turns a wheel, on CAN or at a brick, by its name."""
+        return {**self.drives, **self.motors}

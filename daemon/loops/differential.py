@@ -122,6 +122,29 @@ def bend(drive: DifferentialDrive, radius_m: float, angle_rad: float, power: flo
     return arc_move(drive, radius_m * angle_rad, -angle_rad if clockwise else angle_rad, power)
 
 
+def way_to(drive: DifferentialDrive, goal: Pose, power: float) -> list[Move]:
+    """Open loop from the origin to a pose: turn towards it, drive there, turn to its heading. Raises ValueError."""
+    direction = math.atan2(goal.y_m, goal.x_m) if goal.x_m or goal.y_m else 0.0
+    return [
+        arc_move(drive, 0.0, direction, power),
+        line(drive, math.hypot(goal.x_m, goal.y_m), power),
+        arc_move(drive, 0.0, wrap_angle(goal.yaw_rad - direction), power),
+    ]
+
+
+def parse_move(drive: DifferentialDrive, text: str, power: float) -> Move:
+    """A move in words: ``line METRES``, or ``bend METRES DEGREES [right] [back]``. Raises ValueError."""
+    kind, *words = text.split() or [""]
+    numbers = [float(word) for word in words if word not in ("right", "back")]
+    flags = [word for word in words if word in ("right", "back")]
+    if kind == "line" and len(numbers) == 1 and not flags:
+        return line(drive, numbers[0], power)
+    if kind == "bend" and len(numbers) == 2:
+        signed = -power if "back" in flags else power
+        return bend(drive, numbers[0], math.radians(numbers[1]), signed, clockwise="right" in flags)
+    raise ValueError(f"{text!r} is no move")
+
+
 class TachoCompensation:
     """Takes what a wheel turned too far off its next move (NXT report, listing 4), with the signs of both directions.
 

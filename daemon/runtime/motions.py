@@ -149,6 +149,44 @@ class WheelVelocity(Motion):
         }
 
 
+class AsideVelocity(Motion):
+    """A drive that moves nothing of the vehicle at a speed, for a time or until stopped; its own ramp takes it there.
+
+    Args:
+        drive: the drive.
+        wheel_count: number of wheels of the vehicle.
+        speed_m_s: target speed at the rim.
+        duration_s: time from the begin after which it ends; None: until stopped.
+    """
+
+    def __init__(
+        self, kind: str, drive: Drive, wheel_count: int, speed_m_s: float, duration_s: float | None, lease: str | None
+    ) -> None:
+        super().__init__(kind, (drive.name,), lease)
+        self._drive = drive
+        self._zero = Command((0.0,) * wheel_count)
+        self._speed_m_s = speed_m_s
+        self._remaining_s = duration_s
+        self._from_m = drive.position_m
+
+    def step(self, measurement: Measurement, dt_s: float) -> Command:
+        """The target until the time is over, then zero until the drive is at rest."""
+        if self._remaining_s is not None:
+            self._remaining_s -= dt_s
+        over = bool(self.stop_reason) or (self._remaining_s is not None and self._remaining_s <= 0.0)
+        self._drive.command_speed(0.0 if over else self._speed_m_s)
+        if over and abs(self._drive.speed_m_s) < WheelVelocity.AT_REST_M_S:
+            self.finish({"wheel_travel_m": round(self._drive.position_m - self._from_m, 6)})
+        return self._zero
+
+    def progress(self) -> dict[str, Any]:
+        """Target and measured speed."""
+        return {
+            "target_velocity_rpm": round(self._drive.rpm_from_speed(self._speed_m_s), 1),
+            "velocity_rpm": round(self._drive.rpm_from_speed(self._drive.speed_m_s), 1),
+        }
+
+
 class DriveMove(Motion):
     """A move that the drive carries out itself: profile position, homing, or current for a time.
 

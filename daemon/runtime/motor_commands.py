@@ -6,7 +6,7 @@ from typing import Any
 
 from canhelm.errors import LimitExceeded, NodeAbsent, Refused, UsageError
 from daemon.runtime.handlers import Handler, Params, holder, run_motion
-from daemon.runtime.motions import DriveMove, Motion, WheelVelocity
+from daemon.runtime.motions import AsideVelocity, DriveMove, Motion, WheelVelocity
 from daemon.runtime.supervisor import Supervisor
 from drivers.contract import Drive, DriveState
 
@@ -38,7 +38,8 @@ class MotorCommands:
         for drive in self._supervisor.devices.drives.values():
             if node in (drive.name, drive.node, str(drive.node)):
                 return drive
-        have = ", ".join(f"{drive.node} ({drive.name})" for drive in self._supervisor.devices.drives.values())
+        drives = self._supervisor.devices.drives.values()
+        have = ", ".join(f"{drive.node} ({drive.name})" if drive.node else drive.name for drive in drives)
         number = int(node) if str(node).isdigit() else None
         raise NodeAbsent(f"no drive {node} in this profile", node=number, remedy=f"drives: {have}")
 
@@ -66,6 +67,9 @@ class MotorCommands:
             raise _too_fast(drive, drive.rpm_from_speed(speed), limit)
         duration = params.get("duration_s")
         held = holder(params, lease, endless=duration is None)
+        if drive in self._supervisor.vehicle.aside:
+            aside = AsideVelocity("motor.velocity", drive, self._wheels(), speed, duration, held)
+            return await run_motion(self._supervisor, aside, params)
         wheel, count = self._supervisor.vehicle.wheel_of(drive.name)
         return await run_motion(
             self._supervisor, WheelVelocity("motor.velocity", drive, wheel, count, speed, duration, held), params

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Protocol
 
 from canhelm.errors import NodeAbsent, Refused
@@ -21,6 +22,9 @@ class Network(Protocol):
     def set_input(self, node: int, number: int, level: bool) -> None:
         """Apply a level to a digital input of a drive."""
 
+    def turn_sensor(self, node: int, angle_rad: float | None) -> None:
+        """Hold the axis of an encoder by hand at an angle; None lets go of it."""
+
 
 class SimulationCommands:
     """Handlers of the ``simulation.*`` methods, by name in :attr:`handlers`.
@@ -33,11 +37,16 @@ class SimulationCommands:
     def __init__(self, supervisor: Supervisor, network: Network | None) -> None:
         self._supervisor = supervisor
         self._network = network
-        self.handlers: dict[str, Handler] = {"simulation.power": self._power, "simulation.input": self._input}
+        self.handlers: dict[str, Handler] = {
+            "simulation.power": self._power,
+            "simulation.input": self._input,
+            "simulation.turn": self._turn,
+        }
 
     async def _power(self, params: Params, lease: str | None) -> dict[str, Any]:
         network = self._simulated("its power is switched by hand")
-        node, on = "all" if params["node"] == "all" else self._member(params["node"]), bool(params["on"])
+        named, on = params["node"], bool(params["on"])
+        node = named if named == "all" or named in self._supervisor.devices.bricks else self._member(named)
         switch = network.power_on if on else network.power_off
         switch(node)
         return {"node": params["node"], "on": on}
@@ -49,6 +58,14 @@ class SimulationCommands:
             raise NodeAbsent(f"node {node} is no drive and has no digital inputs", node=node, remedy="name a drive")
         network.set_input(node, number, level == "high")
         return {"node": params["node"], "input": number, "level": level}
+
+    async def _turn(self, params: Params, lease: str | None) -> dict[str, Any]:
+        network = self._simulated("its axes are turned by hand")
+        node, angle = self._member(params["node"]), params["angle_deg"]
+        if node not in {encoder.node for encoder in self._supervisor.devices.encoders.values()}:
+            raise NodeAbsent(f"node {node} is no encoder", node=node, remedy="name an encoder")
+        network.turn_sensor(node, None if angle is None else math.radians(angle))
+        return {"node": params["node"], "angle_deg": angle}
 
     def _simulated(self, why_not: str) -> Network:
         if self._network is None:

@@ -73,6 +73,11 @@ class Stopping:
         return self.cause is not None or bool(self.estop_reason)
 
     @property
+    def pressed(self) -> str:
+        """Which emergency stop contact demands a stop now; empty where none does."""
+        return next((reason for drive in self._drives if (reason := drive.emergency_stop)), "")
+
+    @property
     def under_way(self) -> bool:
         """Whether a stop was commanded and the vehicle is not known at rest yet."""
         return self._halting > 0
@@ -161,10 +166,13 @@ class Stopping:
         """Clear the latched emergency stop and faults.
 
         Raises:
+            EmergencyStop: a contact is still pressed.
             DeviceFault: a cause is still there.
             Refused: the vehicle was stopped again in the meantime; that stop stays latched.
         """
         count = self._latched
+        if self.pressed:
+            raise EmergencyStop(self.pressed, remedy="release it, then `canhelm reset`")
         if self.latched:
             await self._settled()
             await self._tasks.wait(STOP)
@@ -173,7 +181,7 @@ class Stopping:
                 await drive.reset_fault()
         if count != self._latched:
             raise Refused(f"stopped again during the reset: {self.message}", remedy="`canhelm reset` when it is safe")
-        for device in self._devices.by_node.values():
+        for device in self._devices.all:
             device.fault = None
         if self.latched:
             self._log.add("info", "supervisor", "reset by a person")

@@ -9,6 +9,7 @@ import asyncio
 import itertools
 import logging
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from canhelm.errors import CanhelmError, DeviceFault, Refused
@@ -23,6 +24,7 @@ from daemon.runtime.watch import DeviceWatch
 from drivers.canopen.master import Master, NodeEvent
 from drivers.contract import Device, Drive, DriveState, NodeState
 from drivers.devices import Devices
+from drivers.nxt.brick import Brick
 
 LOGGER = logging.getLogger("canhelm")
 
@@ -64,6 +66,8 @@ class Supervisor:
         self.power_off, self.until_rest = stopping.power_off, stopping.until_rest
         self.brakes = stopping.brakes
         master.on_event = self._on_node_event
+        for name, brick in devices.bricks.items():
+            brick.on_change = partial(self._on_brick_change, name, brick)
 
     # --- state -------------------------------------------------------------------------------------------------
 
@@ -78,7 +82,7 @@ class Supervisor:
             return VehicleState.STOPPING
         if self.powered:
             return VehicleState.ACTIVE
-        states = {device.node_state for device in self.devices.by_node.values()}
+        states = {device.node_state for device in self.devices.all}
         if states <= {NodeState.READY}:
             return VehicleState.IDLE
         return VehicleState.BOOTING if states <= {NodeState.READY, NodeState.CONFIGURING} else VehicleState.WAITING
@@ -103,8 +107,9 @@ class Supervisor:
         return first if first.startswith(str(self.state)) else f"{self.state}: {first}"
 
     def _waiting(self) -> list[str]:
-        """What is told of each node that is not ready."""
-        return [device.status_sentence for device in self._not_ready() if device.status_sentence]
+        """What is told of each device that is not ready; motors of one brick have one sentence."""
+        told = [device.status_sentence for device in self._not_ready() if device.status_sentence]
+        return list(dict.fromkeys(told))
 
     @property
     def anything_enabled(self) -> bool:
@@ -117,7 +122,7 @@ class Supervisor:
         return bool(self.motions) or self.anything_enabled
 
     def _not_ready(self) -> list[Device]:
-        return [device for device in self.devices.by_node.values() if device.node_state is not NodeState.READY]
+        return [device for device in self.devices.all if device.node_state is not NodeState.READY]
 
     # --- motions -----------------------------------------------------------------------------------------------
 
@@ -193,7 +198,7 @@ class Supervisor:
     def step(self, now_s: float, dt_s: float) -> None:
         """One control step: measure, watch, ask the motions, pass the gate, transmit."""
         measurement = self.measurement = self.vehicle.measure(now_s)
-        self._stopping.rest.look(measurement.wheel_speed_m_s)
+        self._stopping.rest.look((*measurement.wheel_speed_m_s, *[drive.speed_m_s for drive in self.vehicle.aside]))
         self._watch_leases(now_s)
         self._watch_devices(now_s)
         wanted = self._ask_motions(measurement, dt_s)
@@ -204,6 +209,9 @@ class Supervisor:
         for drive, speed in zip(self.vehicle.drives, self.command.wheel_speed_m_s, strict=True):
             if drive.node_state is NodeState.READY:
                 drive.command_speed(speed)
+                drive.transmit(deadline)
+        for drive in self.vehicle.aside:
+            if drive.node_state is NodeState.READY:
                 drive.transmit(deadline)
         self.vehicle.observe(measurement)
         for observer in self.observers:
@@ -228,6 +236,8 @@ class Supervisor:
             self.release_motions(lease, f"the lease of {client} ran out")
 
     def _watch_devices(self, now_s: float) -> None:
+        if not self._stopping.estop_reason and (pressed := self._stopping.pressed):
+            self.estop(pressed)
         if not self._stopping.latched:
             fault = self._watch.look(now_s, powered=self.powered)
             if fault is not None:
@@ -238,6 +248,14 @@ class Supervisor:
         fault = self._watch.lost(event)
         if fault is not None and self._stopping.cause is None and self.powered:
             self.fault(fault)
+
+    def _on_brick_change(self, name: str, brick: Brick, sentence: str) -> None:
+        """A brick has come or gone, or its battery is low; what went away in a motion stops the vehicle."""
+        gone = brick.node_state is NodeState.ABSENT
+        severity = "error" if gone else "warning" if brick.battery_low else "info"
+        self.log.add(severity, name, sentence, "it is tried again by itself" if gone else "")
+        if gone and self._stopping.cause is None and self.powered:
+            self.fault(DeviceFault(sentence, remedy="its motors end their move by themselves, or run out in a second"))
 
     # --- leases ------------------------------------------------------------------------------------------------
 

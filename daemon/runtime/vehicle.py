@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from enum import StrEnum
 from typing import Any
@@ -36,6 +37,7 @@ class Vehicle(ABC):
     Attributes:
         methods: names of the ``drive.*`` methods and of others that this vehicle has.
         zero: the command that moves nothing and leaves the brakes as they are.
+        aside: drives of the profile that no law moves, each for itself.
     """
 
     methods: tuple[str, ...] = ()
@@ -52,7 +54,9 @@ class Vehicle(ABC):
         self.drives = drives
         self.encoders = encoders
         self.brakes = brakes
+        self.aside: tuple[Drive, ...] = ()
         self.zero = Command((0.0,) * len(drives))
+        self._current_signs = [profile.drives[drive.name].direction for drive in drives] if profile.traction else []
         self._gate = Gate(profile.limits, profile.vehicle, wheel_acceleration_m_s2)
 
     def measure(self, now_s: float) -> Measurement:
@@ -68,6 +72,7 @@ class Vehicle(ABC):
             tuple([brake.state is BrakeState.ENGAGED for brake in self.brakes]),
             tuple([brake.state is BrakeState.RELEASED for brake in self.brakes]),
             acceleration_m_s2,
+            tuple([sign * drive.current_a for sign, drive in zip(self._current_signs, self.drives, strict=False)]),
         )
 
     def gate(
@@ -97,16 +102,18 @@ class Vehicle(ABC):
         return [drive.name for drive in self.drives].index(name), len(self.drives)
 
     def wheel_limit_m_s(self, name: str) -> float:
-        """Largest rim speed of a drive: the smaller one of its own limit and the vehicle's."""
-        return min(self.profile.drives[name].max_speed_m_s, self.profile.limits.wheel_speed_m_s)
+        """Largest rim speed of a drive: the smaller one of its own limit and, for a wheel, the vehicle's."""
+        own = self.profile.wheels[name].max_speed_m_s
+        return own if name in {drive.name for drive in self.aside} else min(own, self.profile.limits.wheel_speed_m_s)
 
     def current_limit_a(self, name: str) -> float:
-        """Largest current that may be commanded to a drive."""
-        return self.profile.drives[name].continuous_current_a
+        """Largest current that may be commanded to a drive; a motor without current control refuses any."""
+        drive = self.profile.drives.get(name)
+        return drive.continuous_current_a if drive else math.inf
 
     def stopping_time_s(self) -> float:
         """Time that the slowest quick-stop ramp needs from the fastest speed."""
-        return max(self.wheel_limit_m_s(name) / drive.quick_stop_m_s2 for name, drive in self.profile.drives.items())
+        return max(self.wheel_limit_m_s(name) / drive.quick_stop_m_s2 for name, drive in self.profile.wheels.items())
 
     def status(self) -> dict[str, Any]:
         """The vehicle for ``status``."""

@@ -4,15 +4,24 @@ from __future__ import annotations
 
 from canhelm.errors import ConfigError
 from daemon.runtime.car_vehicle import CarVehicle
+from daemon.runtime.differential_vehicle import DifferentialVehicle
 from daemon.runtime.omni_vehicle import OmniVehicle
 from daemon.runtime.paired_steer_vehicle import PairedSteerVehicle
 from daemon.runtime.vehicle import BareDrives, Vehicle
 from drivers.devices import Devices
-from profiles.schema import CarGeometry, OmniGeometry, PairedSteerGeometry, Profile
+from profiles.bricks import DifferentialGeometry
+from profiles.schema import OmniGeometry, PairedSteerGeometry, Profile
+from profiles.steered import CarGeometry
 
 
 def make_vehicle(profile: Profile, devices: Devices) -> Vehicle:
     """The vehicle of a profile on its devices. Raises ConfigError for a type that has no loops here."""
+    vehicle = _vehicle_of(profile, devices)
+    vehicle.aside = tuple(drive for drive in devices.drives.values() if drive not in vehicle.drives)
+    return vehicle
+
+
+def _vehicle_of(profile: Profile, devices: Devices) -> Vehicle:
     geometry = profile.vehicle
     if geometry is None:
         return BareDrives(profile, tuple(devices.drives.values()))
@@ -29,4 +38,7 @@ def make_vehicle(profile: Profile, devices: Devices) -> Vehicle:
         axle = geometry.steering
         wheels = tuple(devices.drives[name] for name in geometry.wheels)
         return CarVehicle(profile, wheels, devices.drives[axle.drive], devices.encoders[axle.encoder])
+    if isinstance(geometry, DifferentialGeometry):
+        right, left = (devices.drives[name] for name in geometry.wheels)
+        return DifferentialVehicle(profile, (right, left))
     raise ConfigError(f"profile {profile.name}: no loops for a vehicle of type {type(geometry).__name__}")

@@ -60,7 +60,7 @@ class DeviceWatch:
                 return self._silence(device, *self._who_is_silent(device), now_s)
         return None
 
-    def _cycles_unread(self, device: Device) -> int:
+    def _cycles_unread(self, device: CanopenDevice) -> int:
         """Looks since the device's last reading."""
         reading_s, cycles = self._unread.get(device.node, (-math.inf, 0))
         cycles = cycles + 1 if device.reading_time_s == reading_s else 0

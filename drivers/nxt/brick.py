@@ -27,11 +27,16 @@ from drivers.nxt.line import REPLY_TIMEOUT_S, BrickLine, Port
 
 FULL_SPEED_DEG_S: Final = 1000.0
 """Speed that the brick regulates to at power 100 (LEGO firmware)."""
+PUSHED_DEG: Final = 3
+"""A motor that has turned farther since it came to rest was turned by somebody."""
+REST_TIMEOUT_S: Final = 3.0
 _BRAKED: Final = OutputMode.MOTOR_ON | OutputMode.BRAKE
 _DRIVEN: Final = _BRAKED | OutputMode.REGULATED
 _CHARGE: Final = "charge or change the battery"
 
 T = TypeVar("T", bound=Telegram)
+OnLost = Callable[[str], None]
+"""Takes the reason why a connection has vanished."""
 Legs = Mapping[Output, tuple[float, float]]
 """Power and angle [deg] by motor; the angle's sign is the direction."""
 
@@ -81,11 +86,10 @@ class Brick:
         battery_v: its last reading; nan before the first.
         connections, losses: how often it was connected and lost.
         on_change: called when it has come or gone, or its battery is low, with the sentence.
+        on_output: called with each reading of a motor.
     """
 
-    def __init__(
-        self, name: str, connect: Callable[[Callable[[str], None]], Port], settings: BrickSettings = BrickSettings()
-    ) -> None:
+    def __init__(self, name: str, connect: Callable[[OnLost], Port], settings: BrickSettings = BrickSettings()) -> None:
         self.name = name
         self.settings = settings
         self.node_state = NodeState.ABSENT
@@ -96,13 +100,17 @@ class Brick:
         self.connections = 0
         self.losses = 0
         self.on_change: Callable[[str], None] | None = None
+        self.on_output: Callable[[replies.OutputState], None] | None = None
         self._connect = connect
         self._line: BrickLine | None = None
         self._life: asyncio.Task[None] | None = None
         self._ready = asyncio.Event()
         self._stops = 0
-        self._moving = False
+        self._still = asyncio.Event()
+        self._still.set()
         self._loose = set(Output) - {Output.ALL}
+        self._counts: dict[Output, int] = {}
+        self._left_at: dict[Output, int] = {}
 
     # --- the connection ----------------------------------------------------------------------------------------------
 
@@ -227,7 +235,24 @@ class Brick:
 
     async def output(self, port: Output) -> replies.OutputState:
         """Read a motor."""
-        return await self._read(requests.GetOutputState(port), replies.OutputState)
+        state = await self._read(requests.GetOutputState(port), replies.OutputState)
+        self._counts[port] = state.tacho_deg
+        if self.on_output is not None:
+            self.on_output(state)
+        return state
+
+    async def until_rest(self, ports: Iterable[Output], timeout_s: float = REST_TIMEOUT_S) -> dict[Output, int]:
+        """Wait until motors have stopped turning; their tacho counts [deg]. Raises Timeout, and as :meth:`ask`."""
+        before: dict[Output, int] = {}
+        try:
+            async with asyncio.timeout(timeout_s):
+                while (counts := {port: (await self.output(port)).tacho_deg for port in ports}) != before:
+                    before = counts
+        except TimeoutError:
+            raise Timeout(
+                f"motors of {self.name} turn on after their move", remedy="is somebody turning them?"
+            ) from None
+        return counts
 
     # --- battery -----------------------------------------------------------------------------------------------------
 
@@ -253,17 +278,33 @@ class Brick:
 
     # --- motors ------------------------------------------------------------------------------------------------------
 
-    def stop(self, brake: bool = True) -> None:
-        """Stop all motors at once, before anything that waits; a move under way fails. Never raises.
+    @property
+    def moving(self) -> bool:
+        """Whether a move is under way."""
+        return not self._still.is_set()
+
+    async def wait_still(self) -> None:
+        """Return when no move is under way."""
+        await self._still.wait()
+
+    def stop(self, brake: bool = True, port: Output = Output.ALL) -> None:
+        """Stop motors at once, before anything that waits; a move under way fails. Never raises.
 
         Args:
             brake: short them; or else let them coast.
+            port: one of them, or all.
         """
         self._stops += 1
-        self._loose = set(Output) - {Output.ALL}
+        self._loose |= set(Output) - {Output.ALL} if port == Output.ALL else {port}
         if self._line is not None:
             mode, state = (_BRAKED, RunState.RUNNING) if brake else (OutputMode.IDLE, RunState.IDLE)
-            self._line.send_first(requests.SetOutputState(Output.ALL, 0, mode, Regulation.IDLE, 0, state, 0))
+            self._line.send_first(requests.SetOutputState(port, 0, mode, Regulation.IDLE, 0, state, 0))
+
+    def release(self, port: Output) -> None:
+        """Take a motor's power away; the brick goes on counting towards its next move. Raises as :meth:`run`."""
+        self.require_ready()
+        state = requests.SetOutputState(port, 0, OutputMode.IDLE, Regulation.IDLE, 0, RunState.IDLE, 0)
+        self._connected().send(state)
 
     def run(self, powers: Mapping[Output, int]) -> None:
         """Let motors run at regulated speeds, for ``reach_s`` at most; call it again before that.
@@ -302,12 +343,12 @@ class Brick:
         """
         self.require_ready()
         self.require_battery()
-        if self._moving:
+        if self.moving:
             raise NotReady(f"the motors of {self.name} are in the middle of a move", remedy="wait for it, or stop it")
         orders = {port: _order(power, angle) for port, (power, angle) in legs.items() if round(angle)}
         if timeout_s is None:
             timeout_s = 3 + 2 * max((limit / abs(power) / 10 for power, limit in orders.values()), default=0.0)
-        self._moving = True
+        self._still.clear()
         try:
             async with asyncio.timeout(timeout_s):
                 await self._move(orders)
@@ -318,22 +359,36 @@ class Brick:
             self.stop()
             raise
         finally:
-            self._moving = False
+            self._still.set()
 
-    async def run_moves(self, moves: Iterable[Legs]) -> None:
-        """One move after the other; the first that fails ends it. Raises as :meth:`move`."""
-        for legs in moves:
-            await self.move(legs)
+    async def settle(self, ports: Iterable[Output]) -> dict[Output, int]:
+        """Wait until motors rest after a move, and remember where: a wheel that is pushed from there on counts anew.
+
+        Returns:
+            Tacho counts [deg].
+
+        Raises:
+            Timeout: they turn on; and as :meth:`ask`.
+        """
+        counts = await self.until_rest(ports)
+        self._left_at |= counts
+        return counts
 
     async def _move(self, orders: Mapping[Output, tuple[int, int]]) -> None:
         stops = self._stops
+        self._loose |= {port for port in orders if self._was_pushed(port)}
         for port, (power, limit) in orders.items():
             self._drive(port, power, limit)
-        for port in orders:
-            while (await self.output(port)).run_state != RunState.IDLE:
-                if self._stops != stops:
-                    raise Refused(f"the motors of {self.name} were stopped in the middle of a move")
+            self._left_at.pop(port, None)
+        while any([(await self.output(port)).run_state != RunState.IDLE for port in orders]):
+            if self._stops != stops:
+                raise Refused(f"the motors of {self.name} were stopped in the middle of a move")
         self._loose -= orders.keys()
+
+    def _was_pushed(self, port: Output) -> bool:
+        """Whether a motor stands elsewhere than its last move has left it; the brick would turn it back."""
+        left_at = self._left_at.get(port)
+        return left_at is not None and abs(self._counts[port] - left_at) > PUSHED_DEG
 
     def _stuck(self, ports: Iterable[Output], timeout_s: float) -> Timeout:
         names = ", ".join(port.name for port in ports)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 from canhelm.errors import Aborted, BusOff, CanhelmError, NotReady, Timeout
-from drivers.nxt.codes import OK, status_of
+from drivers.nxt.codes import OK, Output, status_of
 from drivers.nxt.layout import Telegram
 from drivers.nxt.requests import SetOutputState
 from drivers.nxt.telegrams import Reply, Unframer, make_frame, make_request, parse_reply
@@ -112,8 +112,8 @@ class BrickLine:
         self._submit(_Job(content, None))
 
     def send_first(self, content: SetOutputState) -> None:
-        """Send an order to a motor before all that waits; orders to motors that wait are forgotten."""
-        self._queue = deque(job for job in self._queue if not isinstance(job.content, SetOutputState))
+        """Send an order to a motor, or to all, before all that waits; those that wait for it are forgotten."""
+        self._queue = deque(job for job in self._queue if not _is_overtaken(job.content, content.port))
         self._queue.appendleft(_Job(content, None))
         self._next()
 
@@ -193,3 +193,7 @@ class BrickLine:
         for job in jobs:
             if job.waiter is not None and not job.waiter.done():
                 job.waiter.set_exception(error)
+
+
+def _is_overtaken(content: Telegram, port: int) -> bool:
+    return isinstance(content, SetOutputState) and port in (content.port, Output.ALL)

@@ -14,8 +14,12 @@ from drivers.simulated.encoder import SimulatedEncoder
 from drivers.simulated.epos import SimulatedEpos
 from drivers.simulated.max2d import Max2dWorld
 from drivers.simulated.node import SimulatedNode
+from drivers.simulated.nxt_link import SimulatedBrick, simulated_brick
 from drivers.simulated.omni import OmniWorld
-from profiles.schema import BrakeConfig, CarGeometry, OmniGeometry, Profile
+from drivers.simulated.stand import StandWorld
+from profiles.bricks import DifferentialGeometry
+from profiles.schema import BrakeConfig, OmniGeometry, Profile
+from profiles.steered import CarGeometry
 
 _BOOT_DELAY_S = (0.05, 0.15)
 """Shortest and longest time from power-up to the boot-up message (assumed)."""
@@ -29,6 +33,8 @@ def make_world(profile: Profile, seed: int) -> BodyWorld:
         return OmniWorld(profile, seed)
     if isinstance(profile.vehicle, CarGeometry):
         return AckermannWorld(profile, seed)
+    if profile.vehicle is None or isinstance(profile.vehicle, DifferentialGeometry):
+        return StandWorld(profile, profile.drives, seed)
     return Max2dWorld(profile, seed)
 
 
@@ -45,7 +51,8 @@ class SimulatedNetwork:
 
     Attributes:
         world: the truth, for tests.
-        drives, encoders, brakes: the twins by their names in the profile.
+        stand: the drives that move nothing of the vehicle.
+        drives, bricks, encoders, brakes: the twins by their names in the profile.
 
     Raises:
         ConfigError: the profile cannot be simulated.
@@ -54,19 +61,24 @@ class SimulatedNetwork:
     def __init__(self, profile: Profile, medium: SimulatedBus, seed: int) -> None:
         random = Random(seed)
         self.world = make_world(profile, seed)
+        self.stand = StandWorld(profile, profile.drives.keys() - self.world.axes.keys(), seed)
+        self.bricks = {name: simulated_brick(profile, name, seed) for name in profile.bricks}
         self.drives = {
             name: SimulatedEpos(
                 medium.port(name),
                 config,
-                self.world.axes[name],
-                self.world,
+                self._world_of(name).axes[name],
+                self._world_of(name),
                 random.uniform(*_BOOT_DELAY_S),
                 random.getrandbits(32),
             )
             for name, config in profile.drives.items()
         }
+        defects = profile.simulation.sensors if profile.simulation else {}
         self.encoders = {
-            name: SimulatedEncoder(medium.port(name), config, name, self.world, random.uniform(*_BOOT_DELAY_S))
+            name: SimulatedEncoder(
+                medium.port(name), config, name, self.world, random.uniform(*_BOOT_DELAY_S), defects.get(name)
+            )
             for name, config in profile.encoders.items()
         }
         self.brakes = {name: self._brake(name, config) for name, config in profile.brakes.items()}
@@ -75,9 +87,15 @@ class SimulatedNetwork:
             for axis in range(2):
                 read = partial(sensor.voltage_mv, axis)
                 self.drives[profile.accelerometer.drive].connect_analog_input(axis + 1, read)
+        for name, config in profile.drives.items():
+            if config.emergency_stop:
+                self.drives[name].set_digital_input(config.emergency_stop.input, config.emergency_stop.pressed == "low")
         self._watch: asyncio.TimerHandle | None = None
         for drive in self.drives.values():
             drive.on_power_stage = self._on_power_stage
+
+    def _world_of(self, drive: str) -> BodyWorld:
+        return self.world if drive in self.world.axes else self.stand
 
     def _brake(self, name: str, config: BrakeConfig) -> SimulatedBrake:
         brake = SimulatedBrake(config, partial(self._move_brake, name))
@@ -93,16 +111,37 @@ class SimulatedNetwork:
         raise KeyError(which)
 
     def power_on(self, which: int | str = "all") -> None:
-        """Switch on one node, by id or name, or all; each boots after its own delay."""
+        """Switch on one node, by id or name, or a brick, or all; each node boots after its own delay."""
         for node in self._nodes(which):
             node.power_on()
+        for brick in self._bricks(which):
+            brick.power_on()
 
     def power_off(self, which: int | str = "all") -> None:
-        """Switch off one node, by id or name, or all, at once."""
+        """Switch off one node, by id or name, or a brick, or all, at once."""
         for node in self._nodes(which):
             node.power_off()
+        for brick in self._bricks(which):
+            brick.power_off()
+
+    def set_input(self, node: int, number: int, level: bool) -> None:
+        """Apply a level to digital input 1 to 6 of a drive."""
+        drive = self.node(node)
+        assert isinstance(drive, SimulatedEpos)
+        drive.set_digital_input(number, level)
+
+    def turn_sensor(self, node: int, angle_rad: float | None) -> None:
+        """Hold the axis of an encoder by hand at an angle; None lets go of it."""
+        encoder = self.node(node)
+        assert isinstance(encoder, SimulatedEncoder)
+        encoder.sensor.held_rad = angle_rad
+
+    def _bricks(self, which: int | str) -> list[SimulatedBrick]:
+        return [brick for name, brick in self.bricks.items() if which in ("all", name)]
 
     def _nodes(self, which: int | str) -> list[SimulatedNode]:
+        if which in self.bricks:
+            return []
         return [*self.drives.values(), *self.encoders.values()] if which == "all" else [self.node(which)]
 
     async def close(self) -> None:
@@ -110,6 +149,8 @@ class SimulatedNetwork:
         self.power_off()
         for node in self._nodes("all"):
             await node.port.close()
+        for brick in self.bricks.values():
+            await brick.close()
         for brake in self.brakes.values():
             brake.close()
         if self._watch is not None:
@@ -133,6 +174,7 @@ class SimulatedNetwork:
 
     def _look(self) -> None:
         self._watch = None
-        self.world.advance(asyncio.get_running_loop().time())
-        if self.world.moving or any(drive.motion.powered for drive in self.drives.values()):
+        for world in (self.world, self.stand):
+            world.advance(asyncio.get_running_loop().time())
+        if self.world.moving or self.stand.moving or any(drive.motion.powered for drive in self.drives.values()):
             self._wake()

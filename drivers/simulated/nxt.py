@@ -142,6 +142,14 @@ class SimulatedNxt:
             self._stop_motors()
         return asleep
 
+    def switch_off(self) -> None:
+        """No power: motors coast, and all counts are gone when it is on again."""
+        self.catch_up()
+        self._stop_motors()
+        self.program = None
+        for motor in self.motors:
+            motor.forget_counts()
+
     def _answer(self, telegram: bytes) -> Reply:
         opcode, request = telegram[1], parse_request(telegram)
         if isinstance(request, str):

@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Callable
+from typing import Final
 
 from canhelm.errors import BusOff
-from drivers.simulated.nxt import SimulatedNxt
+from drivers.nxt.codes import Output
+from drivers.simulated.nxt import BLUETOOTH, USB, SimulatedNxt
+from drivers.simulated.nxt_robot import NxtRobotConstants, SimulatedNxtRobot
 from drivers.simulated.serial_wire import SerialCable
+from profiles.bricks import DifferentialGeometry
+from profiles.schema import Profile
+
+MAX_NAME: Final = 14
+"""Characters of a brick's name."""
 
 
 class LinkEnd:
@@ -73,3 +82,58 @@ class SimulatedLink:
             self._end.close()
             asyncio.get_running_loop().call_soon(self._on_lost, reason)
             self._end = None
+
+
+class SimulatedBrick:
+    """A brick of a profile, its connection, and the robot around it where it drives one.
+
+    Args:
+        brick: the brick.
+        robot: what it drives; None for motors that only turn.
+
+    Attributes:
+        brick, robot: as given.
+        link: makes connections to it.
+    """
+
+    def __init__(self, brick: SimulatedNxt, robot: SimulatedNxtRobot | None = None) -> None:
+        self.brick = brick
+        self.robot = robot
+        self.link = SimulatedLink(brick)
+        self.link.reachable = False
+
+    def power_on(self) -> None:
+        """Switch it on."""
+        self.link.reachable = True
+
+    def power_off(self) -> None:
+        """Switch it off: its motors coast, the connection is gone."""
+        self.link.reachable = False
+        self.brick.switch_off()
+        self.link.drop("it was switched off")
+
+    async def close(self) -> None:
+        """Let nothing be under way any more."""
+        self.link.reachable = False
+        self.brick.cable.to_host.clear()
+        self.brick.cable.to_device.clear()
+
+
+def simulated_brick(profile: Profile, name: str, seed: int) -> SimulatedBrick:
+    """The brick of a profile by its name; over USB it is as fast as USB is."""
+    config, vehicle = profile.bricks[name], profile.vehicle
+    timing = USB if config.port == "usb" else BLUETOOTH
+    wheels = vehicle.wheels if isinstance(vehicle, DifferentialGeometry) else ()
+    motors = [config.motors[wheel] for wheel in wheels if wheel in config.motors]
+    if not isinstance(vehicle, DifferentialGeometry) or len(motors) != len(wheels):
+        return SimulatedBrick(SimulatedNxt(name[:MAX_NAME], timing=timing))
+    right, left = motors
+    constants = NxtRobotConstants(
+        right.wheel_radius_m,
+        vehicle.half_track_m,
+        math.radians(right.play_deg),
+        outputs=(Output[right.output], Output[left.output]),
+        directions=(right.direction, left.direction),
+    )
+    robot = SimulatedNxtRobot(constants, seed, timing)
+    return SimulatedBrick(robot.brick, robot)

@@ -126,6 +126,10 @@ class NxtMotor:
         else:
             self._rotation = 0
 
+    def forget_counts(self) -> None:
+        """As after switching on."""
+        self._count = self._block = self._rotation = self._to_run = 0
+
     def state(self, port: int) -> OutputState:
         """What GetOutputState tells."""
         order = self._order

@@ -1,6 +1,6 @@
 """A robot on two wheels with a simulated NXT: where it really is, which its brick cannot know.
 
-The motors are at B (right) and C (left). Between each motor and its wheel there is play, which the floor takes up: a
+Between each motor and its wheel there is play, which the floor takes up: a
 wheel stays where it is until the flank of the gear takes it along. Wheels roll without slipping, on radii and a track
 that are not quite those that are written down.
 """
@@ -25,6 +25,7 @@ class NxtRobotConstants:
         wheel_radius_m, half_track_m: what is written down.
         play_rad: of the gear, at the wheel.
         load_n_m: rolling resistance at each wheel.
+        outputs, directions: of the right and the left motor; at -1 positive power rolls the wheel backward.
         motor_scatter: relative standard deviation of each motor's constants.
         size_scatter: of wheel radii and track, as a calibration leaves it.
     """
@@ -33,6 +34,8 @@ class NxtRobotConstants:
     half_track_m: float = 0.0585
     play_rad: float = math.radians(4)
     load_n_m: float = 0.01
+    outputs: tuple[Output, Output] = (Output.B, Output.C)
+    directions: tuple[int, int] = (1, 1)
     motor_scatter: float = 0.05
     size_scatter: float = 0.0003
 
@@ -65,11 +68,11 @@ class SimulatedNxtRobot:
         self._wheels = [
             _Wheel(
                 self.brick.motors[port],
-                constants.wheel_radius_m * dice.gauss(1.0, constants.size_scatter),
+                sign * constants.wheel_radius_m * dice.gauss(1.0, constants.size_scatter),
                 constants.play_rad / 2,
                 dice.uniform(-constants.play_rad / 2, constants.play_rad / 2),
             )
-            for port in (Output.B, Output.C)
+            for port, sign in zip(constants.outputs, constants.directions, strict=True)
         ]
         for wheel in self._wheels:
             wheel.motor.load_n_m = constants.load_n_m

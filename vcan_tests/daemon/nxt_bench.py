@@ -16,7 +16,7 @@ from drivers.simulated.nxt_robot import REPORT_ROBOT, NxtRobotConstants, Simulat
 
 DRIVE = DifferentialDrive(REPORT_ROBOT.wheel_radius_m, REPORT_ROBOT.half_track_m)
 PORTS = (Output.B, Output.C)
-SEEK = SeekSettings(Tolerance(0.001, 0.001, math.radians(1.0)), timeout_s=30.0, wheel_limit_rad_s=6.0)
+SEEK = SeekSettings(Tolerance(0.002, 0.002, math.radians(1.0)), timeout_s=30.0, wheel_limit_rad_s=6.0)
 SETTLE_S = 0.5
 
 

@@ -254,7 +254,8 @@ async def test_after_a_broken_move_the_next_one_is_not_longer(bench: Bench) -> N
 
 
 async def test_moves_in_a_row_do_not_add_up_what_they_overshoot(bench: Bench) -> None:
-    await bench.brick.run_moves([{Output.B: (40, 360)}] * 5)
+    for _ in range(5):
+        await bench.brick.move({Output.B: (40, 360)})
     await asyncio.sleep(0.5)
     assert 5 * 360 <= bench.turned()[1] <= 5 * 360 + 120
 

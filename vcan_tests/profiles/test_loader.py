@@ -46,7 +46,8 @@ def test_the_shipped_robot_loads_by_name() -> None:
 
 def test_every_shipped_robot_loads_without_a_warning() -> None:
     warnings = {path.stem: load(path).warnings for path in available([SHIPPED / "robots"])}
-    assert warnings == {"ackermann": (), "max2d": (), "turtle": ()}
+    assert warnings.keys() >= {"max2d", "nxt", "turtle"}
+    assert not any(warnings.values()), warnings
 
 
 def test_a_robot_of_this_machine_goes_before_the_shipped_one(tmp_path: Path) -> None:
