@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import getpass
 import grp
-import json as json_text
 import os
-import shutil
-import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
@@ -19,6 +16,7 @@ from canhelm.client import Client
 from canhelm.errors import CanhelmError
 from daemon.cli.options import DEFAULT, Options
 from daemon.cli.output import show
+from drivers.bus.can_link import CanLink, read_link
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -120,18 +118,18 @@ def interface_findings(devices: Path) -> Iterator[Finding]:
         mend = "plug in an adapter, or: sudo modprobe vcan && sudo ip link add vcan0 type vcan"
         yield Finding("can", "note", "no CAN interface; the simulated bus needs none", mend)
     for name in names:
-        yield interface_finding(name, devices / name, link_details(name))
+        yield interface_finding(name, devices / name, read_link(name))
 
 
-def interface_finding(name: str, folder: Path, details: Mapping[str, Any]) -> Finding:
+def interface_finding(name: str, folder: Path, link: CanLink) -> Finding:
     """One CAN interface: up, not bus-off, and with a queue that holds a cycle's frames.
 
     Args:
         name: of the interface.
         folder: of its attributes.
-        details: as :func:`link_details` gives them.
+        link: what the kernel tells of it.
     """
-    rate, state = details.get("bitrate"), str(details.get("state", ""))
+    rate, state = link.bit_rate, link.state
     queue = int(_read(folder / "tx_queue_len") or 0)
     shown = f"{rate} bit/s, {state or 'state unknown'}, queue of {queue}" if rate else f"queue of {queue}"
     if not int(_read(folder / "flags") or "0", 16) & IFF_UP:
@@ -145,40 +143,25 @@ def interface_finding(name: str, folder: Path, details: Mapping[str, Any]) -> Fi
         return Finding(name, "note", shown, "check cable, termination, bit rate, and that a node has power")
     if queue < WANTED_QUEUE:
         return Finding(name, "note", shown, f"sudo ip link set {name} txqueuelen {WANTED_QUEUE}")
-    if rate and details.get("restart_ms") == 0:
+    if rate and link.restart_ms == 0:
         mend = f"{name} type can restart-ms {RESTART_MS}; sudo ip link set {name} up"
         mend = f"sudo ip link set {name} down; sudo ip link set {mend}"
         return Finding(name, "note", f"up, {shown}, stays bus-off once it is", mend)
     return Finding(name, "ok", f"up, {shown}")
 
 
-def bit_rate_findings(bus: Mapping[str, Any], details: Mapping[str, Any]) -> Iterator[Finding]:
+def bit_rate_findings(bus: Mapping[str, Any], link: CanLink) -> Iterator[Finding]:
     """Whether the interface has the bit rate that the daemon's profile gives.
 
     Args:
         bus: of the daemon's status.
-        details: of that interface, as :func:`link_details` gives them.
+        link: what the kernel tells of that interface.
     """
-    name, wanted, rate = bus.get("name"), bus.get("bit_rate"), details.get("bitrate")
+    name, wanted, rate = bus.get("name"), bus.get("bit_rate"), link.bit_rate
     if rate and rate != wanted:
         set_up = f"sudo ip link set {name} up type can bitrate {wanted} restart-ms {RESTART_MS}"
         mend = f"sudo ip link set {name} down; {set_up}"
         yield Finding("bit rate", "problem", f"{name} has {rate} bit/s, the profile says {wanted}", mend)
-
-
-def link_details(name: str) -> dict[str, Any]:
-    """Bit rate, controller state and restart delay of an interface as ``ip`` tells them; empty where it does not."""
-    tool = shutil.which("ip")
-    if tool is None:
-        return {}
-    command = [tool, "-json", "-details", "link", "show", name]
-    try:
-        told = subprocess.run(command, capture_output=True, text=True, timeout=5.0, check=False)
-        data = json_text.loads(told.stdout)[0]["linkinfo"]["info_data"]
-        rate = data.get("bittiming", {}).get("bitrate")
-        return {"bitrate": rate, "state": data.get("state"), "restart_ms": data.get("restart_ms")}
-    except (OSError, subprocess.TimeoutExpired, ValueError, LookupError, TypeError, AttributeError):
-        return {}
 
 
 def _read(path: Path) -> str:
@@ -206,7 +189,7 @@ def _daemon_findings(options: Options) -> Iterator[Finding]:
                 status = _next_status(client)
                 yield from status_findings(status, earlier)
                 bus = status.get("bus") or {}
-                yield from bit_rate_findings(bus, link_details(str(bus.get("name"))))
+                yield from bit_rate_findings(bus, read_link(str(bus.get("name"))))
         except CanhelmError as error:
             yield Finding("daemon", "problem", error.message, error.remedy or "")
 

@@ -19,6 +19,7 @@ from typing import Any
 
 from canhelm.errors import BusOff
 from drivers.bus import can_errors
+from drivers.bus.can_link import read_link
 from drivers.bus.contract import Bus, FrameHandler
 from drivers.bus.controller import Controller
 from drivers.bus.interface_load import NETWORK_DEVICES, InterfaceLoad
@@ -109,7 +110,7 @@ class SocketCanBus(Bus):
         self._reopen_s = FIRST_REOPEN_S
 
     async def open(self) -> None:
-        """Open the interface on the running loop. Raises BusOff where it is down or missing."""
+        """Open the interface on the running loop. Raises BusOff where it is down, missing, or has another bit rate."""
         self._loop = asyncio.get_running_loop()
         self._connect()
 
@@ -261,11 +262,20 @@ class SocketCanBus(Bus):
         except OSError as error:
             self._disconnect()
             raise self._bus_off(error) from error
+        self._require_bit_rate()
         self._link_overflowed = 0
         self._reopen_s = FIRST_REOPEN_S
         self._loop.add_reader(link.fileno(), self._on_readable)
         self._recover()
         self._look()
+
+    def _require_bit_rate(self) -> None:
+        """Take no part with another bit rate than the network's: it would destroy the others' frames."""
+        rate = read_link(self.name).bit_rate
+        if rate not in (None, self.bit_rate):
+            self._disconnect()
+            self.down = f"it has {rate} bit/s, the profile says {self.bit_rate}"
+            raise BusOff(f"socketcan interface {self.name}: {self.down}", remedy=self.remedy())
 
     def _make_link(self) -> socket.socket:
         link = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
@@ -313,9 +323,12 @@ class SocketCanBus(Bus):
 
     def _reopen(self) -> None:
         self._reopen_s = min(2.0 * self._reopen_s, LAST_REOPEN_S)
+        cause = self.down
         try:
             self._connect()
-        except BusOff:
+        except BusOff as error:
+            if self.down != cause:
+                LOGGER.error("%s", error)
             self._timer = self._loop.call_later(self._reopen_s, self._reopen)
         else:
             LOGGER.info("%s is back", self.name)
@@ -333,4 +346,5 @@ class SocketCanBus(Bus):
             return self._controller.remedy()
         if self.name.startswith("vcan"):
             return f"sudo ip link add dev {self.name} type vcan; sudo ip link set {self.name} up"
-        return f"sudo ip link set {self.name} up type can bitrate {self.bit_rate} restart-ms 100"
+        set_up = f"{self.name} up type can bitrate {self.bit_rate} restart-ms 100"
+        return f"sudo ip link set {self.name} down; sudo ip link set {set_up}"

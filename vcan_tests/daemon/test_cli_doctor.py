@@ -10,6 +10,7 @@ import pytest
 
 from daemon.cli.doctor import Finding, bit_rate_findings, interface_finding, interface_findings, status_findings
 from daemon.cli.main import main
+from drivers.bus.can_link import CanLink
 from vcan_tests.daemon.fake_backend import FakeBackend, served
 
 READY = {"node": 1, "name": "rear_right", "node_state": "ready", "state": "disabled"}
@@ -29,51 +30,51 @@ def findings(earlier: dict[str, Any] | None = None, **status: Any) -> dict[str, 
 
 
 def test_an_interface_that_is_down_is_brought_up(tmp_path: Path) -> None:
-    found = interface_finding("can0", interface(tmp_path, flags="0x0"), {"bitrate": 1_000_000})
+    found = interface_finding("can0", interface(tmp_path, flags="0x0"), CanLink(1_000_000))
     assert (found.verdict, "ip link set can0 up type can bitrate" in found.mend) == ("problem", True)
 
 
 def test_a_virtual_interface_needs_no_bit_rate(tmp_path: Path) -> None:
-    found = interface_finding("vcan0", interface(tmp_path, "vcan0", flags="0x0"), {})
+    found = interface_finding("vcan0", interface(tmp_path, "vcan0", flags="0x0"), CanLink())
     assert found.mend == "sudo ip link set vcan0 up"
 
 
 def test_bus_off_is_a_problem(tmp_path: Path) -> None:
-    found = interface_finding("can0", interface(tmp_path), {"bitrate": 500_000, "state": "BUS-OFF"})
+    found = interface_finding("can0", interface(tmp_path), CanLink(500_000, "BUS-OFF"))
     assert (found.verdict, "termination" in found.mend) == ("problem", True)
 
 
 def test_a_short_queue_is_noted(tmp_path: Path) -> None:
-    found = interface_finding("can0", interface(tmp_path, queue="10"), {})
+    found = interface_finding("can0", interface(tmp_path, queue="10"), CanLink())
     assert (found.verdict, "txqueuelen" in found.mend) == ("note", True)
 
 
 def test_a_controller_that_stays_bus_off_is_noted(tmp_path: Path) -> None:
-    details = {"bitrate": 1_000_000, "state": "ERROR-ACTIVE", "restart_ms": 0}
-    found = interface_finding("can0", interface(tmp_path), details)
+    link = CanLink(1_000_000, "ERROR-ACTIVE", restart_ms=0)
+    found = interface_finding("can0", interface(tmp_path), link)
     assert (found.verdict, "type can restart-ms 100" in found.mend) == ("note", True)
 
 
 def test_a_controller_with_many_errors_is_noted(tmp_path: Path) -> None:
-    found = interface_finding("can0", interface(tmp_path), {"bitrate": 1_000_000, "state": "ERROR-PASSIVE"})
+    found = interface_finding("can0", interface(tmp_path), CanLink(1_000_000, "ERROR-PASSIVE"))
     assert (found.verdict, "termination" in found.mend) == ("note", True)
 
 
 def test_another_bit_rate_than_the_profiles_is_a_problem() -> None:
-    (found,) = bit_rate_findings({"name": "can0", "bit_rate": 1_000_000}, {"bitrate": 500_000})
+    (found,) = bit_rate_findings({"name": "can0", "bit_rate": 1_000_000}, CanLink(500_000))
     assert found.verdict == "problem"
     assert found.mend == (
         "sudo ip link set can0 down; sudo ip link set can0 up type can bitrate 1000000 restart-ms 100"
     )
 
 
-@pytest.mark.parametrize("details", [{}, {"bitrate": None}, {"bitrate": 1_000_000}])
-def test_the_right_bit_rate_and_an_unknown_one_are_no_finding(details: dict[str, Any]) -> None:
-    assert not list(bit_rate_findings({"name": "can0", "bit_rate": 1_000_000}, details))
+@pytest.mark.parametrize("link", [CanLink(), CanLink(1_000_000)])
+def test_the_right_bit_rate_and_an_unknown_one_are_no_finding(link: CanLink) -> None:
+    assert not list(bit_rate_findings({"name": "can0", "bit_rate": 1_000_000}, link))
 
 
 def test_an_interface_in_order_is_ok(tmp_path: Path) -> None:
-    found = interface_finding("can0", interface(tmp_path), {"bitrate": 1_000_000, "state": "ERROR-ACTIVE"})
+    found = interface_finding("can0", interface(tmp_path), CanLink(1_000_000, "ERROR-ACTIVE"))
     assert (found.verdict, found.mend) == ("ok", "")
 
 

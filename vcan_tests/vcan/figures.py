@@ -70,12 +70,14 @@ class Stop:
     Attributes:
         struck_s: when the daemon got its signal, wall-clock time.
         lived_s: longest time from the last guarding answer of a drive until it missed its master.
-        missed_s: time until the last drive missed its master.
+        first_s: time until the first drive missed its master.
+        missed_s: time until the last one did.
         rest_s: time until all drives stood.
     """
 
     struck_s: float
     lived_s: float
+    first_s: float
     missed_s: float
     rest_s: float
 
@@ -137,8 +139,8 @@ class Figures:
         show(f"{death.words}, {len(stops)} times, {left_out} left out; limit {limit_s:.3f} s")
         show(
             *(
-                f"  all missed their master after {stop.missed_s:.3f} s, at the latest {stop.lived_s:.3f} s after "
-                f"they were guarded; all stood after {stop.rest_s:.3f} s"
+                f"  the drives missed their master after {stop.first_s:.3f} to {stop.missed_s:.3f} s, "
+                f"at most {stop.lived_s:.3f} s after they were guarded; all stood after {stop.rest_s:.3f} s"
                 for stop in stops
             )
         )
@@ -174,6 +176,7 @@ class Figures:
         return Stop(
             struck_s,
             max(life_time_s(frames, node, struck_s + after_s) for node, after_s in missed_s.items()),
+            min(missed_s.values()),
             max(missed_s.values()),
             max(at_rest_after(frames, node, struck_s) for node in DRIVES),
         )

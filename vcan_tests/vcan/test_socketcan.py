@@ -29,6 +29,7 @@ from vcan_tests.kernel.slcan_adapter import SlcanAdapter
 pytestmark = [pytest.mark.vcan, pytest.mark.timeout(60)]
 
 SYNC = 0x080
+BIT_RATE = 1_000_000
 PERIOD_S = 0.01
 CHILD = """
 import asyncio
@@ -49,7 +50,7 @@ asyncio.run(main())
 
 @contextlib.asynccontextmanager
 async def opened(channel: str = "vcan0") -> AsyncIterator[SocketCanBus]:
-    bus = SocketCanBus(channel, 1_000_000)
+    bus = SocketCanBus(channel, BIT_RATE)
     await bus.open()
     try:
         yield bus
@@ -243,7 +244,7 @@ async def test_few_frames_wait_in_the_kernel_for_an_adapter_that_takes_none(monk
         take(adapter, line)
 
     monkeypatch.setattr(SlcanAdapter, "_from_kernel", take_when_awake)
-    with SlcanAdapter() as adapter:
+    with SlcanAdapter(bit_rate=BIT_RATE) as adapter:
         async with opened("can0") as bus:
             awake.clear()
             try:
@@ -328,11 +329,29 @@ async def test_a_bus_that_is_closed_while_its_interface_is_down_opens_no_more(sp
     assert bus._link is None
 
 
+async def test_an_interface_with_another_bit_rate_is_left_alone_until_it_has_the_networks(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    with SlcanAdapter(bit_rate=BIT_RATE) as adapter:
+        async with opened("can0") as bus:
+            adapter.down()
+            ip("link", "set", "can0", "type", "can", "bitrate", "125000")
+            adapter.up()
+            await until(lambda: bus.down == "it has 125000 bit/s, the profile says 1000000")
+            *_, mend = bus.remedy().split("; sudo ")
+            assert mend == "ip link set can0 up type can bitrate 1000000 restart-ms 100"
+            adapter.down()
+            ip("link", "set", "can0", "type", "can", "bitrate", str(BIT_RATE))
+            adapter.up()
+            await until(lambda: bus.down is None)
+    assert "it has 125000 bit/s" in caplog.text
+
+
 # -- error states -----------------------------------------------------------------------------------------------------
 
 
 async def test_error_states_of_a_controller_are_followed_with_their_counters() -> None:
-    with SlcanAdapter() as adapter:
+    with SlcanAdapter(bit_rate=BIT_RATE) as adapter:
         async with opened("can0") as bus:
             adapter.report_state("warning", rx_errors=10, tx_errors=96)
             await until(lambda: bus.details().get("controller") == "error-warning")
@@ -345,7 +364,7 @@ async def test_error_states_of_a_controller_are_followed_with_their_counters() -
 
 
 async def test_errors_on_the_wire_are_told_in_words() -> None:
-    with SlcanAdapter() as adapter:
+    with SlcanAdapter(bit_rate=BIT_RATE) as adapter:
         async with opened("can0") as bus:
             adapter.report_errors("a")
             await until(lambda: bus.counters.error_frames)
@@ -353,7 +372,7 @@ async def test_errors_on_the_wire_are_told_in_words() -> None:
 
 
 async def test_bus_off_takes_the_bus_down_until_the_interface_was_restarted(caplog: pytest.LogCaptureFixture) -> None:
-    with SlcanAdapter() as adapter:
+    with SlcanAdapter(bit_rate=BIT_RATE) as adapter:
         async with opened("can0") as bus:
             bus.send(0x201)
             await until(lambda: adapter.frames == ["t2010"])
