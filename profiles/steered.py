@@ -72,7 +72,7 @@ class TrailerGeometry(Part, frozen=True, kw_only=True):
 
 
 class SemitrailerGeometry(Part, frozen=True, kw_only=True, tag_field="type", tag="semitrailer"):
-    """Geometry and bodies of a truck with a steered front axle, one driven axle and a semi-trailer (thesis, chapter 2)."""
+    """A truck with a steered front axle and one driven axle, and its semi-trailer (thesis, chapter 2)."""
 
     type: ClassVar[str] = "semitrailer"
     mass_kg: Positive

@@ -17,7 +17,8 @@ from daemon.loops.motion_profile import ARRIVED_M, ramp, speed_to_end
 from daemon.loops.odometry import MAX_STEP_M, Pose, moved_along_arc
 from daemon.loops.pid import PidGains
 from daemon.loops.steered_axle import SteeredAxleLaw
-from profiles.schema import CarGeometry, Limits, RegulatorGains
+from profiles.schema import Limits
+from profiles.steered import CarGeometry, RegulatorGains
 
 STEERED_RAD: Final = math.radians(0.3)
 """An arc begins when the steering is closer to its angle than this."""

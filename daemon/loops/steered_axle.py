@@ -11,7 +11,7 @@ from typing import Final
 
 from daemon.loops.geometry import clamp
 from daemon.loops.motion_profile import approach_speed, ramp
-from profiles.schema import SteeredAxle
+from profiles.steered import SteeredAxle
 
 GAIN_1_S: Final = 10.0
 """Of the final approach; with three cycles of delay at 100 Hz inside 1/e, so that nothing overshoots."""

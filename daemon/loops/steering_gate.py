@@ -8,7 +8,7 @@ from typing import Final
 from daemon.loops.geometry import clamp
 from daemon.loops.limits import NOT_FINITE
 from daemon.loops.motion_profile import ramp
-from profiles.schema import SteeredAxle
+from profiles.steered import SteeredAxle
 
 STEERING_RATE: Final = "steering_rate_gate"
 STEERING_RAMP: Final = "steering_ramp_gate"

@@ -12,7 +12,8 @@ from daemon.runtime.car_motions import CarMotion, CarStream
 from daemon.runtime.motions import Motion
 from daemon.runtime.steered_vehicle import SteeredVehicle
 from drivers.contract import Drive, SteeringEncoder
-from profiles.schema import CarGeometry, Profile
+from profiles.schema import Profile
+from profiles.steered import CarGeometry
 
 _ROUNDING = 1e-9
 

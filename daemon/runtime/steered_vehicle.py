@@ -6,7 +6,8 @@ from daemon.loops.measurement import Command, Measurement
 from daemon.loops.steering_gate import SteeringGate
 from daemon.runtime.vehicle import Vehicle
 from drivers.contract import Drive, SteeringEncoder
-from profiles.schema import Profile, SteeredAxle
+from profiles.schema import Profile
+from profiles.steered import SteeredAxle
 
 
 class SteeredVehicle(Vehicle):

@@ -28,7 +28,8 @@ from drivers.simulated.motor import WheelDrive
 from drivers.simulated.steered_axle import SimulatedSteering
 from drivers.simulated.tyre import DAMPING_S, Contact
 from drivers.simulated.world import STEP_S
-from profiles.schema import CarGeometry, Profile, SimulationConfig
+from profiles.schema import Profile, SimulationConfig
+from profiles.steered import CarGeometry
 
 LOAD_SHIFT_S = 0.05
 """Time constant with which wheel loads follow the body's acceleration (assumed)."""

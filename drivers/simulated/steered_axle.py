@@ -11,7 +11,8 @@ from math import radians
 import msgspec
 
 from drivers.simulated.motor import WheelDrive
-from profiles.schema import DriveConfig, SimulationConfig, SteeredAxle
+from profiles.schema import DriveConfig, SimulationConfig
+from profiles.steered import SteeredAxle
 
 
 class SimulatedSteering:

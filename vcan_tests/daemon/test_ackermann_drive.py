@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from daemon.loops.ackermann_drive import CarLaw, CarOdometry, CarTarget
 from daemon.loops.measurement import Measurement
 from profiles.loader import load
-from profiles.schema import CarGeometry
+from profiles.steered import CarGeometry
 
 PROFILE = load("ackermann").profile
 assert isinstance(PROFILE.vehicle, CarGeometry)

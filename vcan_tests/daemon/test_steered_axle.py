@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from daemon.loops.steered_axle import STEERING_LIMIT, STEERING_RATE, SteeredAxleLaw
 from daemon.loops.steering_gate import SteeringGate
-from profiles.schema import SteeredAxle
+from profiles.steered import SteeredAxle
 
 DT = 0.01
 ARM_M = 0.1
