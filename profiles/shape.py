@@ -30,6 +30,8 @@ class Shape:
             return self._dict(node, kind, path)
         if isinstance(kind, inspect.TupleType):
             return self._tuple(node, kind, path)
+        if isinstance(kind, inspect.VarTupleType):
+            return self._several(node, kind, path)
         return self._scalar(node, kind, path)
 
     def _wrong(self, place: Place, path: FieldPath, what: str, remedy: str) -> None:
@@ -83,6 +85,11 @@ class Shape:
         pairs = enumerate(zip(node.items, kind.item_types, strict=True))
         return [self.walk(item, item_kind, (*path, index)) for index, (item, item_kind) in pairs]
 
+    def _several(self, node: Node, kind: inspect.VarTupleType, path: FieldPath) -> Any:
+        if not isinstance(node, Listing) or len(node.items) < (kind.min_length or 0):
+            return self._not_a(node, path, expected(kind))
+        return [self.walk(item, kind.item_type, (*path, index)) for index, item in enumerate(node.items)]
+
     def _scalar(self, node: Node, kind: inspect.Type, path: FieldPath) -> Any:
         if not isinstance(node, Scalar) or not _fits(node.value, kind):
             return self._not_a(node, path, expected(kind))
@@ -112,6 +119,8 @@ def expected(kind: inspect.Type) -> str:
         return "a text" + (f" that matches {kind.pattern}" if kind.pattern else "")
     if isinstance(kind, inspect.TupleType):
         return f"a list of {len(kind.item_types)}"
+    if isinstance(kind, inspect.VarTupleType):
+        return f"a list of {expected(kind.item_type)}"
     if isinstance(kind, inspect.BoolType):
         return "true or false"
     return "nothing" if isinstance(kind, inspect.NoneType) else "a mapping"

@@ -286,6 +286,12 @@ _NETWORK = (
         ),
         "node, input, level",
     ),
+    Method(
+        "simulation.turn",
+        "Hold the axis of a simulated encoder by hand, as for a calibration.",
+        (_NODE, replace(_angle("angle_deg", "where it is held; let go where left out"), default=None)),
+        "node, angle_deg",
+    ),
 )
 
 _CONFIRM = Param("confirm", "boolean", "must be true: somebody has agreed", default=False)

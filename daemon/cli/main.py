@@ -55,6 +55,7 @@ COMMANDS: dict[Group, dict[str, str]] = {
         "run": "daemon.cli.run:run",
         "make-safe": "daemon.cli.make_safe:make_safe",
         "profile": "daemon.cli.profile:app",
+        "calibrate": "daemon.cli.calibrate:app",
         "version": "daemon.cli.version:version",
         "completion": "daemon.cli.completion:completion",
     },

@@ -26,6 +26,17 @@ def power(node: NodeOrAll, state: Literal["on", "off"], /, *, options: Options =
         show(client.call("simulation.power", node=wanted, on=state == "on"), json=options.json)
 
 
+@app.command
+def turn(node: Node, angle: float | None = None, /, *, options: Options = DEFAULT) -> None:
+    """Hold the axis of a simulated encoder by hand at an angle, as for a calibration; without an angle, let go of it.
+
+    Example: `canhelm sim turn steering 12.5`
+    """
+    wanted = node_of(node)
+    with options.client() as client:
+        show(client.call("simulation.turn", node=wanted, angle_deg=angle), json=options.json)
+
+
 @app.command(name="input")
 def digital_input(node: Node, number: Input, level: Literal["low", "high"], /, *, options: Options = DEFAULT) -> None:
     """Apply a level to a digital input of a simulated drive, as an emergency stop button does.

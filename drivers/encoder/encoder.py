@@ -20,7 +20,15 @@ _unpack_position = POSITION.unpack
 
 
 def heading_of(counts: int, config: EncoderConfig) -> float:
-    """Heading in rad of a position value: its distance from the zero position, wrapped to half a range on each side."""
+    """Heading in rad of a position value, corrected where the encoder is calibrated."""
+    sensed = sensed_heading(counts, config)
+    if config.calibration is None:
+        return sensed
+    return math.radians(config.calibration.correct(math.degrees(sensed)))
+
+
+def sensed_heading(counts: int, config: EncoderConfig) -> float:
+    """What a position value says [rad]: its distance from the zero position, wrapped to half a range on each side."""
     span = config.total_counts or config.counts_per_turn
     half = span // 2
     from_zero = (counts - config.zero_counts + half) % span - half
@@ -150,5 +158,6 @@ class Cia406Encoder(CanopenDevice):
         """Everything about the encoder."""
         return super().status() | {
             "heading_deg": round(math.degrees(self.heading_rad), 3),
+            "sensed_deg": round(math.degrees(sensed_heading(self.counts, self.config)), 4),
             "position_counts": self.counts,
         }

@@ -9,12 +9,14 @@ from math import floor, tau
 
 from drivers.canopen.codes import NmtState
 from drivers.encoder.objects import MULTI_TURN, OBJECTS, SINGLE_TURN
+from drivers.simulated.angle_sensor import SimulatedAngleSensor
 from drivers.simulated.bus import SimulatedPort
 from drivers.simulated.dictionary import TOO_HIGH, SdoAbort, SimulatedDictionary, Value
 from drivers.simulated.lss_slave import UNCONFIGURED, LssSlave
 from drivers.simulated.node import Handler, SimulatedNode
 from drivers.simulated.world import World
 from profiles.schema import EncoderConfig
+from profiles.sensors import SensorDefects
 
 _GUARDING, _LSS_REQUEST, _LSS_ANSWER = 0x700, 0x7E5, 0x7E4
 _IDENTITY = ("vendor_id", "product_code", "revision_number", "identity_serial_number")
@@ -71,13 +73,21 @@ class SimulatedEncoder(SimulatedNode):
         pair: name by which the world knows the wheel pair.
         world: the physics.
         boot_delay_s: time from power-up to the boot-up message.
+        defects: of its sensor.
 
     Attributes:
+        sensor: between the wheel pair and the counts.
         lss: its LSS slave, with node id and bit rate that it has stored.
     """
 
     def __init__(
-        self, port: SimulatedPort, config: EncoderConfig, pair: str, world: World, boot_delay_s: float
+        self,
+        port: SimulatedPort,
+        config: EncoderConfig,
+        pair: str,
+        world: World,
+        boot_delay_s: float,
+        defects: SensorDefects | None = None,
     ) -> None:
         turns = max(1, (config.total_counts or config.counts_per_turn) // config.counts_per_turn)
         factory: dict[str, Value] = {
@@ -95,6 +105,7 @@ class SimulatedEncoder(SimulatedNode):
         self._config = config
         self._pair = pair
         self._world = world
+        self.sensor = SimulatedAngleSensor(defects or SensorDefects())
         self._alarms = 0
         identity = (*_FACTORY_IDENTITY, _FIRST_SERIAL + config.node)
         self.lss = LssSlave(identity, config.node, self._lss_ended)
@@ -143,7 +154,8 @@ class SimulatedEncoder(SimulatedNode):
         per_turn = self._config.counts_per_turn
         reverse = self.dictionary.number("operating_parameters") & _REVERSED
         sign = -self._config.direction if reverse else self._config.direction
-        counts = self._config.zero_counts + sign * self._world.heading_rad(self._pair) / tau * per_turn
+        angle = self.sensor.sense(self._world.heading_rad(self._pair))
+        counts = self._config.zero_counts + sign * angle / tau * per_turn
         if self._scaled():
             counts *= self.dictionary.number("measuring_units_per_turn") / per_turn
         return floor(counts + 0.5)

@@ -37,11 +37,11 @@ class Bench:
         log: what it wrote to stderr.
     """
 
-    def __init__(self, folder: Path, bus: str = "simulated") -> None:
+    def __init__(self, folder: Path, bus: str = "simulated", profile_text: str = PATIENT_PROFILE) -> None:
         self.socket = folder / "robot.sock"
         self.log = folder / "daemon.log"
         profile = folder / "max2d.yaml"
-        profile.write_text(PATIENT_PROFILE)
+        profile.write_text(profile_text)
         arguments = ("run", "--bus", bus, "--profile", str(profile), "--socket", str(self.socket))
         with self.log.open("w") as log:
             self.process = subprocess.Popen([sys.executable, "-m", "daemon", *arguments], stderr=log, stdout=log)
