@@ -148,5 +148,5 @@ class Life:
 def _farewell(doubtful: tuple[Drive, ...]) -> str:
     if not doubtful:
         return "the vehicle is at rest and its drives are off"
-    names = ", ".join(f"node {drive.node} ({drive.name})" for drive in doubtful)
+    names = ", ".join(f"node {drive.node} ({drive.name})" if drive.node else drive.name for drive in doubtful)
     return f"ended without contact to {names}: make sure yourself that the vehicle is at rest and its drives are off"

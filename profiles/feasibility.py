@@ -85,7 +85,7 @@ def findings(data: dict[str, Any]) -> Iterator[Finding]:
                 yield from _drive(("drives", name), drive, supply_v, load)
                 yield from _limits_of_drive(limits, drive, name)
     for brick in part(data, "bricks"):
-        yield from _brick_motors(limits, ("bricks", brick, "motors"), part(part(part(data, "bricks"), brick), "motors"))
+        yield from _brick_motors(data, brick, limits)
     yield from _limits(limits, vehicle, encoders)
     telling = sum(drive is not None and drive.tells_inputs for drive in drives.values())
     yield from _bus(_valid(data.get("network", {}), Network), len(drives), len(encoders), telling)
@@ -212,14 +212,15 @@ def _steering_limits(steering: SteeredAxle, drive: DriveConfig, name: str) -> It
     yield from _at_most(path, steering.acceleration_deg_s2, ramp, "deg/s^2", reason)
 
 
-def _brick_motors(limits: Limits | None, path: tuple[str, ...], motors: dict[str, Any]) -> Iterator[Finding]:
-    for name, value in motors.items():
-        motor = _valid(value, NxtMotorConfig)
+def _brick_motors(data: dict[str, Any], brick: str, limits: Limits | None) -> Iterator[Finding]:
+    wheels = part(data, "vehicle").get("wheels") or ()
+    for name, value in part(part(part(data, "bricks"), brick), "motors").items():
+        motor, path = _valid(value, NxtMotorConfig), ("bricks", brick, "motors", name, "max_speed_m_s")
         if motor is None:
             continue
         allowed = math.radians(BRICK_FULL_SPEED_DEG_S) * motor.wheel_radius_m
-        yield from _at_most((*path, name, "max_speed_m_s"), motor.max_speed_m_s, allowed, "m/s", "the brick regulates")
-        if limits is not None:
+        yield from _at_most(path, motor.max_speed_m_s, allowed, "m/s", "the brick regulates up to")
+        if limits is not None and name in wheels:
             wheel, place = limits.wheel_speed_m_s, ("limits", "wheel_speed_m_s")
             yield from _at_most(place, wheel, motor.max_speed_m_s, "m/s", f"motor {name} allows")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from daemon.api.nxt_methods import NXT_METHODS
 from daemon.api.parameters import REQUIRED, Method, Param, Role
 
 _NODE = Param("node", "node", "node id, or name from the profile")
@@ -384,7 +385,7 @@ _CONFIG = (
 )
 
 METHODS: dict[str, Method] = {
-    method.name: method for method in (*_TALK, *_WHOLE, *_MOTOR, *_VEHICLE, *_NETWORK, *_NODES, *_CONFIG)
+    method.name: method for method in (*_TALK, *_WHOLE, *_MOTOR, *_VEHICLE, *_NETWORK, *_NODES, *_CONFIG, *NXT_METHODS)
 }
 
 NOTIFICATIONS = {

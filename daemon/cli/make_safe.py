@@ -10,11 +10,15 @@ from canhelm.errors import CanhelmError, NodeAbsent, Timeout
 from daemon.cli.output import say, say_error, say_warning
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from drivers.canopen.master import Master
+    from drivers.devices import Connect
     from profiles.schema import Profile
 
 SETTLING_S = 0.3
 """Time that wheels and body are given beyond the longest ramp."""
+BRICK_WITHIN_S = 2.5
 LONGEST_S = 8.0
 """What is not done by then is left."""
 
@@ -67,14 +71,32 @@ async def _on_bus(profile: Profile, spec: str) -> int:
 
     wire = make_wire(spec, profile, 0)
     master = Master(wire.bus, wire.profile.network)
+    bricks = asyncio.create_task(_stop_bricks(wire.bricks))
     try:
         await master.start()
-        return await secure(master, wire.profile)
+        return await secure(master, wire.profile) if profile.drives else 0
     except CanhelmError as error:
         say_warning(f"no drive can be reached: {error}")
         return 0
     finally:
         await master.close()
+        await bricks
+
+
+async def _stop_bricks(ways: Mapping[str, Connect]) -> None:
+    """Connect to each brick, which stops its motors, and let it go."""
+    from drivers.nxt.brick import Brick
+
+    for name, connect in ways.items():
+        brick = Brick(name, connect)
+        brick.start()
+        try:
+            async with asyncio.timeout(BRICK_WITHIN_S):
+                await brick.wait_ready()
+            say(f"the motors of brick {name} are stopped")
+        except TimeoutError:
+            say_warning(f"brick {name} cannot be reached: {brick.status_sentence}")
+        await brick.close()
 
 
 async def secure(master: Master, profile: Profile) -> int:

@@ -45,7 +45,8 @@ def run(
     Args:
         profile: Name of a profile, or a YAML file.
         bus: `socketcan:can0` or another INTERFACE:CHANNEL of python-can; `rs232:/dev/ttyS0@115200` for the serial line
-            of one EPOS that forwards to the others; `simulated`, or `rs232` for a simulated serial line.
+            of one EPOS that forwards to the others; `simulated`, or `rs232` for a simulated serial line. For a robot
+            with nothing on CAN: `serial:/dev/rfcomm0` or `usb` for its NXT brick, `none`: as the profile says.
         simulate: Simulate the network of the profile in this process; the same as `--bus simulated`.
         virtual_time: Refused here: clients live in real time. `canhelm demo --virtual-time` has it.
         seed: Seed of everything random in the simulated network.
@@ -145,7 +146,8 @@ def _bus(bus: str | None, *, simulate: bool) -> str:
     if simulate and bus is not None and not simulates(bus):
         raise UsageError(f"--simulate and --bus {bus} contradict each other", remedy="give one of them")
     if bus is None and not simulate:
-        raise UsageError("which bus?", remedy="give --simulate, or --bus socketcan:can0")
+        remedy = "give --simulate, or --bus socketcan:can0 (for an NXT brick serial:/dev/rfcomm0, or usb)"
+        raise UsageError("which bus?", remedy=remedy)
     return bus or "simulated"
 
 

@@ -41,7 +41,7 @@ def simulate(
     Args:
         profile: Name of a profile, or a YAML file.
         bus: `rs232:pty` or `rs232:pty@38400`: the serial line of one drive, on a pseudo terminal whose name is printed;
-            or a CAN interface such as `socketcan:vcan0`.
+            `serial:pty`: the robot's NXT brick on one; or a CAN interface such as `socketcan:vcan0`.
         nodes: Node ids or names, separated by commas; the others have no power. All without it.
         gateway: The drive with the serial line; the first of the profile without it.
         seed: Seed of everything random.
@@ -62,8 +62,10 @@ def simulate(
     if serial:
         baud = int(serial[1] or DEFAULT_BAUD)
         run_precise(_on_terminal(robot, nodes, gateway, baud, SerialNoise(*shares), seed, json))
+    elif bus == "serial:pty":
+        run_precise(_brick_on_terminal(robot, seed, json))
     elif bus == "simulated" or bus.startswith("rs232") or ":" not in bus:
-        remedy = "give rs232:pty, or a CAN interface such as socketcan:vcan0"
+        remedy = "give rs232:pty, serial:pty, or a CAN interface such as socketcan:vcan0"
         raise UsageError(f"nobody could reach a network on {bus!r}", value=bus, remedy=remedy)
     elif gateway is not None or shares != _CLEAN:
         raise UsageError("a gateway and noise are for the serial line", remedy="give --bus rs232:pty")
@@ -103,6 +105,27 @@ async def _on_terminal(
     await ended.wait()
     pty.close()
     await network.close()
+
+
+async def _brick_on_terminal(profile: Profile, seed: int, json: bool | None) -> None:
+    """The robot's only brick, as over Bluetooth."""
+    from drivers.simulated.nxt_link import simulated_brick
+    from drivers.simulated.serial_wire import SerialPty
+
+    if len(profile.bricks) != 1:
+        remedy = "give a profile with one, such as nxt"
+        raise UsageError(
+            f"robot {profile.name} has {len(profile.bricks)} NXT bricks", value=profile.name, remedy=remedy
+        )
+    ended, name = _ending(), next(iter(profile.bricks))
+    twin = simulated_brick(profile, name, seed)
+    pty = SerialPty(twin.brick.cable)
+    show({"device": pty.device, "brick": name}, json=json)
+    command = f"canhelm run --profile {profile.name} --bus serial:{pty.device}"
+    say(f"the brick runs; drive it with `{command}`, end it with Ctrl-C")
+    await ended.wait()
+    pty.close()
+    await twin.close()
 
 
 async def _on_interface(profile: Profile, nodes: str | None, spec: str, seed: int) -> None:

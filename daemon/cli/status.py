@@ -77,6 +77,7 @@ def table(data: Mapping[str, Any]) -> RenderableType:
     nodes = data.get("nodes") or ()
     parts: list[RenderableType] = [_headline(data), _NodeTable(nodes), *_troubles(nodes)]
     parts.append(_brakes(data.get("brakes") or ()))
+    parts += [_section(f"brick {brick['name']}", brick) for brick in data.get("bricks") or ()]
     sections = {title: data.get(title) for title in ("vehicle", "motions", "cycle")}
     sections |= {**_bus_groups(data.get("bus") or {}), "recording": data.get("recording")}
     parts += [_section(title, value) for title, value in sections.items() if value]

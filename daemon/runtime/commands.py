@@ -6,8 +6,9 @@ from typing import Any
 
 from canhelm.errors import Refused
 from daemon.runtime.brake_commands import BrakeCommands
+from daemon.runtime.brick_commands import BrickCommands
 from daemon.runtime.config_commands import ConfigCommands
-from daemon.runtime.handlers import Handler, Params, holder, node_number, run_motion
+from daemon.runtime.handlers import Handler, Params, holder, run_motion
 from daemon.runtime.motions import Motion
 from daemon.runtime.motor_commands import MotorCommands
 from daemon.runtime.network_commands import NetworkCommands
@@ -36,6 +37,7 @@ class Commands:
             "motion.stop": self._motion_stop,
             **MotorCommands(supervisor).handlers,
             **BrakeCommands(supervisor).handlers,
+            **BrickCommands(supervisor).handlers,
             **NetworkCommands(supervisor).handlers,
             **NodeCommands(supervisor).handlers,
             **ConfigCommands(supervisor).handlers,

@@ -169,7 +169,7 @@ class BrickMoves(Motion):
         loop = asyncio.get_running_loop()
         self.begun_s, goal = loop.time(), self._odometry.pose
         try:
-            counts: Mapping[Output, int] = await self._wheels.brick.settle(self._wheels.outputs)
+            counts: Mapping[Output, int] = await self._wheels.brick.until_rest(self._wheels.outputs)
             for move in self._moves:
                 if not self.stop_reason:
                     counts = await self._drive_one(move, counts)

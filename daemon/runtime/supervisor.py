@@ -150,7 +150,8 @@ class Supervisor:
                     remedy="wait for it, or `canhelm stop`",
                 )
         self.brakes.require_released(motion.drives)
-        self.vehicle.require_free(motion)
+        if set(motion.drives) - {drive.name for drive in self.vehicle.aside}:
+            self.vehicle.require_free(motion)
         motion.identity = str(next(self._numbers))
         self.motions[motion.identity] = motion
         LOGGER.info("motion %s (%s) begins, %s", motion.identity, motion.kind, self._holder(motion))

@@ -125,7 +125,7 @@ class NxtDrive:
         """Take the motor's power away when it has come to rest; then, or after three seconds of turning, it coasts."""
         self.target_speed_m_s = 0.0
         try:
-            await self.brick.settle((self.output,))
+            await self.brick.until_rest((self.output,))
         finally:
             self._enabled_in = -1
             if self.node_state is NodeState.READY:
@@ -225,12 +225,15 @@ class MotorCycle:
 
     async def _live(self) -> None:
         while True:
-            await self._brick.wait_ready()
             await self._brick.wait_still()
+            if self._brick.node_state is not NodeState.READY:
+                self._sent.clear()
+                for drive in self._drives.values():
+                    drive.speed_m_s = 0.0
+            await self._brick.wait_ready()
             try:
                 await self._round()
             except CanhelmError:  # the brick tells what is wrong with its connection
-                self._sent.clear()
                 await asyncio.sleep(RETRY_S)
 
     async def _round(self) -> None:
