@@ -129,6 +129,10 @@ class PathDriver:
         """From now on come to rest where the vehicle is."""
         self._stopping = True
 
+    def fail(self, reason: str) -> None:
+        """From now on come to rest; the last step tells the reason."""
+        self._failed = self._failed or reason
+
     def step(self, reading: VehicleReading, dt: float) -> DrivingStep:
         """One control cycle.
 
@@ -143,7 +147,7 @@ class PathDriver:
         unit = self._vehicle.poses(reading.truck, reading.bending_rad)[-1 if backward else 0]
         following = self._law(unit, reading)
         wanted, limit = self._speed_law.wanted(following)
-        self._failed = self._failed or self._failure(reading, following)
+        self.fail(self._failure(reading, following))
         if (self._failed or self._stopping) and self._phase is not Phase.DONE:
             self._phase = Phase.RESTING
         if self._phase is Phase.STEERING:

@@ -80,7 +80,7 @@ class PathCommands:
     async def _add(self, params: Params, lease: str | None) -> dict[str, Any]:
         """Keep pieces of a path that is too long for one request."""
         pieces = converted(params["pieces"], list[PieceSpec])
-        name = params["kept"]
+        name = params.get("kept")
         if name is None:
             name = str(next(self._numbers))
             if len(self._kept) == MAX_KEPT:
@@ -101,17 +101,18 @@ class PathCommands:
 
     async def _drive(self, params: Params, lease: str | None) -> dict[str, Any]:
         spec = converted(params["path"], PathSpec)
-        if params["kept"] is not None:
-            kept = self._known(params["kept"])
-            spec = msgspec.structs.replace(spec, pieces=[*kept, *spec.pieces])
+        kept = params.get("kept")
+        if kept is not None:
+            spec = msgspec.structs.replace(spec, pieces=[*self._known(kept), *spec.pieces])
         self._supervisor.require_ready(())
-        request = PathRequest(spec, params["backward"], params["speed_m_s"], params["law"])
-        plan = await self._vehicle.plan_path(request)
-        if params["dry_run"]:
+        backward, law = bool(params.get("backward")), params.get("law", "cascade")
+        plan = await self._vehicle.plan_path(PathRequest(spec, backward, params.get("speed_m_s"), law))
+        if params.get("dry_run"):
             return plan.summary()
         if self._supervisor.motions:
             raise Refused("the vehicle moves already", remedy="wait for it, or `canhelm stop`")
-        self._kept.pop(params["kept"], None)
+        if kept is not None:
+            self._kept.pop(kept, None)
         return await run_motion(self._supervisor, plan.motion(holder(params, lease)), params)
 
 

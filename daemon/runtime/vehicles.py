@@ -7,11 +7,12 @@ from daemon.runtime.car_vehicle import CarVehicle
 from daemon.runtime.differential_vehicle import DifferentialVehicle
 from daemon.runtime.omni_vehicle import OmniVehicle
 from daemon.runtime.paired_steer_vehicle import PairedSteerVehicle
+from daemon.runtime.semitrailer_vehicle import SemitrailerVehicle
 from daemon.runtime.vehicle import BareDrives, Vehicle
 from drivers.devices import Devices
 from profiles.bricks import DifferentialGeometry
 from profiles.schema import OmniGeometry, PairedSteerGeometry, Profile
-from profiles.steered import CarGeometry
+from profiles.steered import CarGeometry, SemitrailerGeometry
 
 
 def make_vehicle(profile: Profile, devices: Devices) -> Vehicle:
@@ -38,6 +39,10 @@ def _vehicle_of(profile: Profile, devices: Devices) -> Vehicle:
         axle = geometry.steering
         wheels = tuple(devices.drives[name] for name in geometry.wheels)
         return CarVehicle(profile, wheels, devices.drives[axle.drive], devices.encoders[axle.encoder])
+    if isinstance(geometry, SemitrailerGeometry):
+        drives, encoders = devices.drives, devices.encoders
+        angles = (encoders[geometry.steering.encoder], encoders[geometry.trailer.encoder])
+        return SemitrailerVehicle(profile, drives[geometry.wheels[0]], drives[geometry.steering.drive], angles)
     if isinstance(geometry, DifferentialGeometry):
         right, left = (devices.drives[name] for name in geometry.wheels)
         return DifferentialVehicle(profile, (right, left))

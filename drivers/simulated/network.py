@@ -16,10 +16,11 @@ from drivers.simulated.max2d import Max2dWorld
 from drivers.simulated.node import SimulatedNode
 from drivers.simulated.nxt_link import SimulatedBrick, simulated_brick
 from drivers.simulated.omni import OmniWorld
+from drivers.simulated.semitrailer import SemitrailerWorld
 from drivers.simulated.stand import StandWorld
 from profiles.bricks import DifferentialGeometry
 from profiles.schema import BrakeConfig, OmniGeometry, Profile
-from profiles.steered import CarGeometry
+from profiles.steered import CarGeometry, SemitrailerGeometry
 
 _BOOT_DELAY_S = (0.05, 0.15)
 """Shortest and longest time from power-up to the boot-up message (assumed)."""
@@ -33,6 +34,8 @@ def make_world(profile: Profile, seed: int) -> BodyWorld:
         return OmniWorld(profile, seed)
     if isinstance(profile.vehicle, CarGeometry):
         return AckermannWorld(profile, seed)
+    if isinstance(profile.vehicle, SemitrailerGeometry):
+        return SemitrailerWorld(profile, seed)
     if profile.vehicle is None or isinstance(profile.vehicle, DifferentialGeometry):
         return StandWorld(profile, profile.drives, seed)
     return Max2dWorld(profile, seed)

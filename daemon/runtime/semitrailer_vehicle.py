@@ -1,0 +1,154 @@
+"""The truck with a semi-trailer: it follows paths, forwards and backwards."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any, Final
+
+from canhelm.errors import LimitExceeded
+from daemon.loops.articulated import ArticulatedVehicle, Hitch
+from daemon.loops.measurement import Measurement
+from daemon.loops.odometry import Pose
+from daemon.loops.path_driving import VehicleReading
+from daemon.loops.path_following import FollowingTuning
+from daemon.loops.path_speed import SpeedTuning
+from daemon.loops.truck_odometry import TruckOdometry
+from daemon.runtime.motions import Motion
+from daemon.runtime.path_building import build_path
+from daemon.runtime.path_commands import PathRequest
+from daemon.runtime.path_motions import FollowedPath, PathMotion
+from daemon.runtime.steered_vehicle import SteeredVehicle
+from drivers.contract import Drive, SteeringEncoder
+from profiles.schema import Profile
+from profiles.steered import SemitrailerGeometry
+
+STEERING_SHARE: Final = 0.9
+"""Of the steering angle, what a path may need; the rest is left to the law."""
+BENDING_SHARE: Final = 0.6
+"""Likewise of the bending angle."""
+STEERING_PER_WAY_DEG_M: Final = 300.0
+"""Backwards the speed leaves the steering so much time for each metre: what the laws were tuned for."""
+_ROUNDING: Final = 1e-9
+
+
+class SemitrailerVehicle(SteeredVehicle):
+    """A truck with a semi-trailer.
+
+    Args:
+        profile: the robot.
+        drive: of the driven axle.
+        steering: of the front axle.
+        encoders: of the steering angle and of the bending angle.
+
+    Attributes:
+        kinematics: with the limits of steering and bending angle.
+        axle: the front axle.
+        names: of its drives.
+        reading: newest one; the truck's pose in it is that of the odometry.
+        odometry: where the truck's driven axle is.
+    """
+
+    methods = ("drive.path",)
+
+    def __init__(
+        self, profile: Profile, drive: Drive, steering: Drive, encoders: tuple[SteeringEncoder, SteeringEncoder]
+    ) -> None:
+        assert isinstance(profile.vehicle, SemitrailerGeometry)
+        geometry = self._geometry = profile.vehicle
+        acceleration = profile.drives[drive.name].acceleration_m_s2
+        super().__init__(profile, geometry.steering, (drive,), steering, encoders, acceleration)
+        hitches = (Hitch(geometry.hitch_offset_m, geometry.trailer.length_m),)
+        steering_rad = math.radians(geometry.steering.limit_deg)
+        bending_rad = math.radians(geometry.trailer.max_bending_deg)
+        self.kinematics = ArticulatedVehicle(geometry.wheelbase_m, hitches, steering_rad, bending_rad)
+        self._planned = ArticulatedVehicle(
+            geometry.wheelbase_m, hitches, STEERING_SHARE * steering_rad, BENDING_SHARE * bending_rad
+        )
+        self.axle = geometry.steering
+        self.names: tuple[str, ...] = (drive.name, steering.name)
+        self.odometry = TruckOdometry(geometry.wheelbase_m)
+        self.reading = VehicleReading(Pose(), (0.0,), 0.0, 0.0)
+
+    # --- measuring ---------------------------------------------------------------------------------------------
+
+    def measure(self, now_s: float) -> Measurement:
+        """The newest readings, and where the truck is by them."""
+        measurement = self._readings(now_s)
+        steering, bending = measurement.heading_rad
+        truck = self.odometry.update(measurement.wheel_travel_m[0], steering)
+        self.reading = VehicleReading(truck, (bending,), steering, measurement.wheel_speed_m_s[0])
+        return measurement
+
+    def locate(self, truck: Pose) -> None:
+        """Go on from where the driven axle's middle really is."""
+        self.odometry.pose = truck
+        self.reading = replace(self.reading, truck=truck)
+
+    # --- motions -----------------------------------------------------------------------------------------------
+
+    def motion(self, method: str, params: dict[str, Any], lease: str | None) -> Motion:
+        """Never called: the only method is ``drive.path``, which plans first."""
+        raise AssertionError(method)
+
+    async def plan_path(self, request: PathRequest) -> FollowedPath:
+        """See :class:`daemon.runtime.path_commands.PathVehicle`."""
+        speed = self._speed(request.speed_m_s)
+        units = self.kinematics.poses(self.reading.truck, self.reading.bending_rad)
+        pieces = request.spec.pieces
+        backward = bool(pieces) and (pieces[0].drive == "backward") != request.backward
+        path = await build_path(
+            request.spec,
+            units[-1 if backward else 0],
+            lead_m=self.kinematics.straight_lead_m,
+            exchanged=request.backward,
+            forward_curvature=self._planned.stable_curvature,
+            backward_curvature=self._planned.stable_rear_curvature,
+            run_out_m=FollowingTuning().look_ahead_m,
+        )
+        return FollowedPath(self, path, speed, request.law == "published")
+
+    def _speed(self, wanted_m_s: float | None) -> SpeedTuning:
+        limits = self.profile.limits
+        top = limits.speed_m_s if wanted_m_s is None else wanted_m_s
+        if top > limits.speed_m_s * (1 + _ROUNDING):
+            raise LimitExceeded(
+                f"a speed of {top:g} m/s is beyond the limit",
+                value=top,
+                limit=f"speed_m_s {limits.speed_m_s:g}",
+                remedy=f"ask for at most {limits.speed_m_s:g} m/s",
+            )
+        backward = self.axle.rate_deg_s / STEERING_PER_WAY_DEG_M
+        return SpeedTuning(top, limits.acceleration_m_s2, limits.lateral_acceleration_m_s2, backward)
+
+    def wheel_speeds(self, speed_m_s: float, steering_rad: float) -> tuple[float]:
+        """The driven axle has one motor."""
+        return (speed_m_s,)
+
+    def require_free(self, motion: Motion) -> None:
+        """A path needs both angles."""
+        if isinstance(motion, PathMotion):
+            for encoder in self.encoders:
+                encoder.require_ready()
+
+    def status(self) -> dict[str, Any]:
+        """Angles, jackknife margin and odometry of truck and trailer."""
+        reading = self.reading
+        truck, trailer = self.kinematics.poses(reading.truck, reading.bending_rad)
+        return {
+            "type": SemitrailerGeometry.type,
+            "methods": list(self.methods),
+            "steering_deg": round(math.degrees(reading.steering_rad), 3),
+            "bending_deg": round(math.degrees(reading.bending_rad[0]), 3),
+            "jackknife_margin_deg": round(math.degrees(self.kinematics.jackknife_margin(reading.bending_rad)), 3),
+            "odometry": _shown(truck),
+            "trailer": _shown(trailer),
+        }
+
+
+def _shown(pose: Pose) -> dict[str, float]:
+    return {
+        "x_m": round(pose.x_m, 4),
+        "y_m": round(pose.y_m, 4),
+        "yaw_deg": round(math.degrees(pose.yaw_rad), 3),
+    }
