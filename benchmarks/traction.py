@@ -17,7 +17,7 @@ from statistics import mean
 from daemon.loops.planner import PlanarState
 from daemon.loops.traction import Traction
 from profiles.schema import FloorPatch
-from vcan_tests.daemon.gripping_robot import FLOOR_ROBOT, Answer, Drive, Floor, ImprovedAnswer, PublishedAnswer, drive
+from vcan_tests.daemon.gripping_robot import FLOOR_ROBOT, Drive, Floor, Way, drive
 from vcan_tests.daemon.omni_floor import ICE, OmniFloor, dry, ice_between
 from vcan_tests.daemon.omni_twin import TwinFloor, robot_data, turtle
 
@@ -55,21 +55,19 @@ def report(name: str, drives: list[Drive], undisturbed_s: float) -> None:
 def compare(title: str, make: Callable[[str, int], Floor], twin: bool, seeds: range) -> None:
     """All scenarios on one plant."""
     robot = robot_data(turtle()) if twin else FLOOR_ROBOT
-    undisturbed_s = drive(make("dry", 1), GOAL, Answer(), robot=robot).arrived_s
+    undisturbed_s = drive(make("dry", 1), GOAL, Way.OFF, robot=robot).arrived_s
     print(f"\n{title}; means over {len(seeds)} seeds\n{HEAD}")
     for scenario in PATCHES:
-        ways: list[tuple[str, Callable[[], Answer], bool]] = [
-            ("off", Answer, False),
-            ("published", PublishedAnswer, False),
-            ("improved, accelerometer", lambda: ImprovedAnswer(robot), False),
-            ("improved, currents", lambda: ImprovedAnswer(robot), True),
-        ]
+        ways = {
+            "off": (Way.OFF, False),
+            "published": (Way.PUBLISHED, False),
+            "improved, accelerometer": (Way.IMPROVED, False),
+            "improved, currents": (Way.IMPROVED, True),
+        }
         print(scenario)
-        for way, answer, by_currents in ways:
-            drives = [
-                drive(make(scenario, seed), GOAL, answer(), by_currents=by_currents, robot=robot) for seed in seeds
-            ]
-            report(f"  {way}", drives, undisturbed_s)
+        for name, (way, by_currents) in ways.items():
+            drives = [drive(make(scenario, seed), GOAL, way, by_currents=by_currents, robot=robot) for seed in seeds]
+            report(f"  {name}", drives, undisturbed_s)
 
 
 def small_plant(scenario: str, seed: int) -> Floor:

@@ -18,7 +18,8 @@ import msgspec
 
 from canhelm.errors import UsageError
 from daemon.demo_robot import DemoRobot
-from daemon.loops.omni_guide import PublishedGuide, Signals, Vector
+from daemon.loops.accelerometer import Vector
+from daemon.loops.omni_guide import Felt, PublishedGuide, Signals
 from daemon.loops.planner import PlanarLimits, PlanarState, Result
 from daemon.runtime.handlers import run_motion
 from daemon.runtime.omni_motions import OmniMotion
@@ -144,7 +145,7 @@ def imposed_signals(figure: TurtleFigure, limits: PlanarLimits, dt: float) -> Si
     guide = PublishedGuide(_goal(figure), limits, dt, lambda _: ((0.0, 0.0), (0.0, 0.0)), math.inf)
     state, accelerations, over = PlanarState(), [(0.0, 0.0)], False
     while not over and len(accelerations) * dt < LONGEST_S:
-        step = guide.step(state, None, (0.0, 0.0), dt)
+        step = guide.step(state, Felt(), (0.0, 0.0), dt)
         state, over = step.next, step.result is Result.ARRIVED
         accelerations.append(step.acceleration_m_s2)
 
@@ -192,7 +193,7 @@ async def _drive(robot: DemoRobot, figure: TurtleFigure) -> TurtleResult:
     assert isinstance(vehicle, OmniVehicle)
     limits = replace(vehicle.limits, speed=figure.speed_m_s, acceleration=figure.acceleration_m_s2)
     published = figure.traction is None
-    vehicle.traction = bool(figure.traction)
+    vehicle.senses.observing = bool(figure.traction)
     signals = imposed_signals(figure, limits, app.cycle.period_s) if published else None
     motion = vehicle.to_goal(
         _goal(figure), limits, None, published=published, signals=signals, threshold_m_s2=THRESHOLD_M_S2
@@ -243,7 +244,7 @@ def _observer(robot: DemoRobot, motion: OmniMotion, figure: TurtleFigure, track:
         cos, sin = math.cos(pose[2]), math.sin(pose[2])
         track.time_s.append(time_s)
         track.acceleration.append(record.guidance.acceleration_m_s2)
-        track.measured.append(record.measured_m_s2 or (math.nan, math.nan))
+        track.measured.append(record.felt.acceleration_m_s2 or (math.nan, math.nan))
         track.safety_factor.append(record.guidance.safety_factor)
         track.case.append(record.guidance.case)
         track.velocity.append((cos * vx - sin * vy, sin * vx + cos * vy))

@@ -22,6 +22,7 @@ class Measurement:
         brake_engaged: True for each steering brake that is certainly engaged.
         brake_released: True for each steering brake that is certainly released (both False while it moves).
         acceleration_m_s2: of the accelerometer's place along its axes; None without a reading.
+        motor_current_a: of each wheel's motor, positive where it drives forward.
     """
 
     time_s: float
@@ -31,6 +32,7 @@ class Measurement:
     brake_engaged: tuple[bool, ...] = ()
     brake_released: tuple[bool, ...] = ()
     acceleration_m_s2: tuple[float, float] | None = None
+    motor_current_a: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,10 @@
 
 The wheels are commanded the reference's velocity, and on top of it a velocity in proportion to the distance from the
 reference as it was when the wheels were last told; so a robot that follows as it should is not corrected.
+
+While wheels slip the reference waits for the robot: a plan that starts from what was commanded leaves the wheels
+spinning. It is then no more than a little faster than the robot moves, and a wheel that slips no more than a little
+faster than the floor.
 """
 
 from __future__ import annotations
@@ -11,12 +15,14 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Final
 
-from daemon.loops.measurement import Command, Measurement
-from daemon.loops.odometry import MAX_STEP_M, Pose, moved_along_arc
-from daemon.loops.omni import Motion, OmniKinematics, OmniWheel
-from daemon.loops.omni_guide import Guidance, Guide, TwistGuide, Vector, rotated
+from daemon.loops.accelerometer import Vector, rotated
+from daemon.loops.measurement import Command
+from daemon.loops.odometry import Pose
+from daemon.loops.omni import Motion, OmniKinematics
+from daemon.loops.omni_guide import Felt, Guidance, Guide, TwistGuide
+from daemon.loops.omni_senses import OmniSenses
 from daemon.loops.planner import PlanarLimits, PlanarState, Result
-from profiles.schema import OmniGeometry
+from daemon.loops.wheel_grip import WheelGrip
 
 GAIN_1_S: Final = 5.0
 """Velocity of correction per distance."""
@@ -32,56 +38,20 @@ PATIENCE_S: Final = 1.0
 """Time after which it has arrived where it is."""
 
 
-def omni_kinematics(geometry: OmniGeometry) -> OmniKinematics:
-    """Kinematics of a profile's wheels. Raises ValueError where they leave a motion undetermined."""
-    wheels = geometry.wheels.values()
-    return OmniKinematics([OmniWheel(math.radians(wheel.direction_deg), wheel.lever_m) for wheel in wheels])
-
-
-class OmniOdometry:
-    """Adds up what omni-wheels have rolled.
-
-    Attributes:
-        pose: where the robot's centre is.
-        motion: of the body in its own frame, by the wheels' speeds.
-        skipped: readings that were not used because they cannot be true.
-    """
-
-    def __init__(self, kinematics: OmniKinematics) -> None:
-        self._kinematics = kinematics
-        self._last: tuple[float, ...] | None = None
-        self.pose = Pose()
-        self.motion: Motion = (0.0, 0.0, 0.0)
-        self.skipped = 0
-
-    def update(self, measurement: Measurement) -> Pose:
-        """Take one cycle's wheel travel; the first one only sets the start."""
-        last, self._last = self._last, measurement.wheel_travel_m
-        self.motion = self._kinematics.body_motion(measurement.wheel_speed_m_s)
-        if last is None or last == self._last:
-            return self.pose
-        rolled = [new - old for new, old in zip(self._last, last, strict=True)]
-        if not all(abs(way) <= MAX_STEP_M for way in rolled):
-            self.skipped += 1
-            return self.pose
-        self.pose = moved_along_arc(self.pose, *self._kinematics.body_motion(rolled))
-        return self.pose
-
-
 @dataclass(frozen=True, slots=True)
 class OmniRecord:
     """The terms of one step.
 
     Attributes:
         guidance: what the guide decided.
-        measured_m_s2: acceleration of the centre in the fixed frame, None without an accelerometer.
+        felt: of the robot.
         error: of the pose from the reference of that time: x, y [m], heading [rad].
         stopping: the guide was left, the robot is brought to rest.
         done: at rest at the end of the motion, or as near to its goal as it gets.
     """
 
     guidance: Guidance
-    measured_m_s2: Vector | None
+    felt: Felt
     error: tuple[float, float, float]
     stopping: bool
     done: bool
@@ -94,18 +64,24 @@ class OmniLaw:
         kinematics: of the wheels.
         guide: leads the reference.
         limits: for coming to rest when the motion is stopped.
-        pose: where the robot is at the begin.
-        motion: its velocity in its own frame then.
+        senses: of the robot, as it begins.
+        answers_slip: wait for the robot and hold its wheels while they slip.
     """
 
     def __init__(
-        self, kinematics: OmniKinematics, guide: Guide, limits: PlanarLimits, pose: Pose, motion: Motion
+        self,
+        kinematics: OmniKinematics,
+        guide: Guide,
+        limits: PlanarLimits,
+        senses: OmniSenses,
+        *,
+        answers_slip: bool = True,
     ) -> None:
-        vx, vy = rotated((motion[0], motion[1]), pose.yaw_rad)
         self._kinematics = kinematics
         self._guide = guide
         self._limits = limits
-        self._reference = PlanarState(pose.x_m, pose.y_m, pose.yaw_rad, vx, vy, motion[2])
+        self._grip = WheelGrip(len(kinematics.forward)) if answers_slip else None
+        self._reference = _state(senses.pose, senses.motion)
         self._passed: deque[PlanarState] = deque()
         self._commanded: Vector = (0.0, 0.0)
         self._stopping = False
@@ -117,21 +93,25 @@ class OmniLaw:
             self._stopping = True
             self._guide = TwistGuide((0.0, 0.0, 0.0), self._limits)
 
-    def step(self, pose: Pose, centre_m_s2: Vector | None, dt: float) -> tuple[Command, OmniRecord]:
+    def step(self, senses: OmniSenses, dt: float) -> tuple[Command, OmniRecord]:
         """One cycle.
 
         Args:
-            pose: by odometry.
-            centre_m_s2: acceleration of the robot's centre in its own frame; None without an accelerometer.
+            senses: of the robot, with this cycle's readings.
             dt: length of the cycle [s].
         """
-        measured = None if centre_m_s2 is None else rotated(centre_m_s2, pose.yaw_rad)
-        guidance = self._guide.step(self._reference, measured, self._commanded, dt)
+        pose, measured = senses.pose, senses.acceleration
+        fixed = None if measured is None else rotated(measured, pose.yaw_rad)
+        felt = Felt(fixed, senses.slipping, senses.pushing)
+        guidance = self._guide.step(self._reference, felt, self._commanded, dt)
         self._reference, self._commanded = guidance.next, guidance.acceleration_m_s2
         error = self._error(pose, dt)
         wheels = self._kinematics.wheel_speeds(self._motion(pose, error, dt))
+        if self._grip and (seen := senses.observed):
+            held = seen.slipping if felt.pushing else (False,) * len(wheels)
+            wheels = self._grip.step(wheels, seen.ground_m_s, held, dt).wheel_speeds_m_s
         done = self._is_done(guidance, pose, dt)
-        return Command(wheels), OmniRecord(guidance, measured, error, self._stopping, done)
+        return Command(wheels), OmniRecord(guidance, felt, error, self._stopping, done)
 
     def _error(self, pose: Pose, dt: float) -> tuple[float, float, float]:
         """Distance from the reference of the time at which the robot could know it."""
@@ -163,3 +143,8 @@ class OmniLaw:
             return True
         near = math.hypot(end.x - pose.x_m, end.y - pose.y_m) < NEAR_M
         return near and abs(math.remainder(end.heading - pose.yaw_rad, math.tau)) < NEAR_RAD
+
+
+def _state(pose: Pose, motion: Motion) -> PlanarState:
+    vx, vy = rotated((motion[0], motion[1]), pose.yaw_rad)
+    return PlanarState(pose.x_m, pose.y_m, pose.yaw_rad, vx, vy, motion[2])

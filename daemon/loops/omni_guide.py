@@ -11,12 +11,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol
 
+from daemon.loops.accelerometer import Vector, rotated
 from daemon.loops.planner import Plan, PlanarLimits, PlanarState, Result, follow, plan_motion
 from daemon.loops.published_planner import Branch, PlanningProblem
 from daemon.loops.published_traction import PublishedTraction
 from daemon.loops.traction import Traction
 
-Vector = tuple[float, float]
 Twist = tuple[float, float, float]
 """Speed forward and to the left [m/s], yaw rate counter-clockwise [rad/s], in the robot's frame."""
 Signals = Callable[[float], tuple[Vector, Vector]]
@@ -25,6 +25,24 @@ Signals = Callable[[float], tuple[Vector, Vector]]
 WORTH_A_PLAN = 0.02
 """Change of the safety factor from which on a motion is planned anew."""
 STANDING_M_S = 1e-6
+WORTH_PASSING_M = 0.02
+"""A goal nearer than this is not called overshot."""
+ROUNDING = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class Felt:
+    """What a guide is told of the robot in one cycle.
+
+    Attributes:
+        acceleration_m_s2: measured, of the centre in the fixed frame; None where nothing tells it.
+        slipping: wheels slip.
+        pushing: an obstacle holds the robot.
+    """
+
+    acceleration_m_s2: Vector | None = None
+    slipping: bool = False
+    pushing: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,12 +75,12 @@ class Guidance:
 class Guide(Protocol):
     """Leads a reference."""
 
-    def step(self, reference: PlanarState, measured: Vector | None, commanded: Vector, dt: float) -> Guidance:
+    def step(self, reference: PlanarState, felt: Felt, commanded: Vector, dt: float) -> Guidance:
         """One cycle.
 
         Args:
-            reference: where the last cycle led.
-            measured: acceleration of the robot's centre in the fixed frame [m/s2]; None without an accelerometer.
+            reference: where the last cycle led; while wheels slip, near the robot.
+            felt: of the robot.
             commanded: acceleration of the reference in the last cycle [m/s2].
             dt: length of the cycle [s].
         """
@@ -85,13 +103,18 @@ class Grip:
         self.slip = (False, False)
         self.correction = "none"
 
-    def step(self, measured: Vector | None, commanded: Vector, dt: float, *, at_top_speed: bool) -> None:
-        """Take one cycle's accelerations; the attributes tell what is in force now."""
+    def step(
+        self, felt: Felt, commanded: Vector, dt: float, *, at_top_speed: bool = False, overshoot: bool = False
+    ) -> None:
+        """Take one cycle; the attributes tell what is in force now."""
+        measured = felt.acceleration_m_s2
         if self._traction is None or measured is None:
             return
-        record = self._traction.step(measured, commanded, dt, at_top_speed)
+        record = self._traction.step(
+            measured, commanded, dt, at_top_speed, overshoot, pushing=felt.pushing, slipping=felt.slipping
+        )
         self.factor, self.correction = record.safety_factor, record.correction.value
-        self.slip = record.signal.axes if record.signal.slip else (False, False)
+        self.slip = record.signal.axes if record.signal.slip else (felt.slipping, felt.slipping)
         self.limits = replace(
             self._whole,
             acceleration=self.factor * self._whole.acceleration,
@@ -116,10 +139,11 @@ class GoalGuide:
         self._case = ""
         self._now = 0.0
 
-    def step(self, reference: PlanarState, measured: Vector | None, commanded: Vector, dt: float) -> Guidance:
+    def step(self, reference: PlanarState, felt: Felt, commanded: Vector, dt: float) -> Guidance:
         """One cycle."""
         grip = self._grip
-        grip.step(measured, commanded, dt, at_top_speed=self._case == "cruise")
+        overshoot = _passes(reference, self._goal, grip.limits.acceleration)
+        grip.step(felt, commanded, dt, at_top_speed=self._case == "cruise", overshoot=overshoot)
         plan = self._plan
         if plan is None or abs(grip.factor - self._planned_with) > WORTH_A_PLAN:
             plan = plan_motion(reference, self._goal, grip.limits, self._now)
@@ -144,10 +168,10 @@ class TwistGuide:
         self.twist = twist
         self._grip = Grip(limits, traction)
 
-    def step(self, reference: PlanarState, measured: Vector | None, commanded: Vector, dt: float) -> Guidance:
+    def step(self, reference: PlanarState, felt: Felt, commanded: Vector, dt: float) -> Guidance:
         """One cycle."""
         grip, (forward, left, rate) = self._grip, self.twist
-        grip.step(measured, commanded, dt, at_top_speed=False)
+        grip.step(felt, commanded, dt)
         rate = _towards(reference.rate, rate, grip.limits.angular_acceleration * dt)
         heading = reference.heading + (reference.rate + rate) / 2 * dt
         wanted = rotated((forward, left), reference.heading + rate * dt)
@@ -183,9 +207,9 @@ class PublishedGuide:
         self._signals = signals
         self._now = 0.0
 
-    def step(self, reference: PlanarState, measured: Vector | None, commanded: Vector, dt: float) -> Guidance:
+    def step(self, reference: PlanarState, felt: Felt, commanded: Vector, dt: float) -> Guidance:
         """One cycle."""
-        goal, limits = self._goal, self._limits
+        goal, limits, measured = self._goal, self._limits, felt.acceleration_m_s2
         if self._signals is not None:
             measured, commanded = self._signals(self._now)
         self._now += dt
@@ -209,10 +233,10 @@ class PublishedGuide:
         )  # fmt: skip
 
 
-def rotated(vector: Vector, angle_rad: float) -> Vector:
-    """A vector turned counter-clockwise."""
-    (x, y), cos, sin = vector, math.cos(angle_rad), math.sin(angle_rad)
-    return cos * x - sin * y, sin * x + cos * y
+def _passes(state: PlanarState, goal: PlanarState, acceleration: float) -> bool:
+    """Whether the goal is nearer than the way in which the speed can become the goal's."""
+    left, square = math.hypot(goal.x - state.x, goal.y - state.y), state.vx**2 + state.vy**2
+    return left > WORTH_PASSING_M and square - goal.vx**2 - goal.vy**2 > 2 * acceleration * left * (1 + ROUNDING)
 
 
 def _towards(speed: float, wanted: float, change: float) -> float:

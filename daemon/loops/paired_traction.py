@@ -19,7 +19,7 @@ from daemon.loops.geometry import FRONT, REAR, TURN_SIGN, WHEELS_OF_PAIR, PerPai
 from daemon.loops.odometry import least_squares
 from daemon.loops.slip_observer import Body, Observed, RimDrive, Row, SlipObserver
 from daemon.loops.wheel_grip import WheelGrip, WheelGripRecord
-from profiles.schema import DriveConfig, PairedSteerGeometry
+from profiles.schema import PairedSteerGeometry
 
 RESIDUAL_M_S: Final = 0.05
 """Residual of a wheel that is slip for certain; in a curve the wheels' own mismatch leaves less."""
@@ -92,21 +92,6 @@ class PairedTraction:
             speed - (row[0] * x + row[1] * y + row[2] * turn)
             for row, speed in zip(self._rows, wheel_speeds, strict=True)
         )
-
-
-def rim_drive(drive: DriveConfig, wheel_inertia_kg_m2: float = 0.0, rolling_n: float = 0.0) -> RimDrive:
-    """A drive of the profile as the observer wants it.
-
-    Args:
-        drive: of the profile.
-        wheel_inertia_kg_m2: of the wheel alone.
-        rolling_n: its rolling resistance.
-    """
-    ratio, radius, motor = drive.total_ratio, drive.wheel_radius_m, drive.motor
-    force_per_a = ratio * motor.torque_constant_n_m_a / radius
-    inertia = wheel_inertia_kg_m2 + ratio * ratio * motor.rotor_inertia_kg_m2
-    friction = force_per_a * motor.no_load_current_a + rolling_n
-    return RimDrive(force_per_a, inertia / radius**2, friction, drive.gear_efficiency)
 
 
 def _rows(geometry: PairedSteerGeometry, heading_rad: PerPair) -> tuple[list[Row], list[Row]]:

@@ -1,11 +1,14 @@
-"""Slip of every wheel without an accelerometer: what the motors' currents say about the floor, against the encoders.
+"""Slip of every wheel: the encoders against the body, whose motion the motors' currents or an accelerometer tell.
 
 A wheel's rim, of the rotating mass m_w seen there, obeys m_w du/dt = F_drive - F_friction - F_floor whether it slips
 or not. Current and encoder so give the force of the floor, the sum of these forces the acceleration of the body, and
 its integral a motion that no slip falsifies. Wheels that grip keep it from drifting; what a wheel's rim is faster than
-the body above it is slip. With an accelerometer its reading takes the place of the forces.
+the body above it is slip. With an accelerometer its reading takes the place of the forces, and where both differ,
+something else pushes.
 
-A wheel is a row (c, s, l): its rim rolls at c vx + s vy + l w where the body moves at (vx, vy) and turns at w.
+A wheel is a row (c, s, l): its rim rolls at c vx + s vy + l w where the body moves at (vx, vy) and turns at w. The
+small difference of large forces that turns a robot is a good sign of w only where currents are exact. Where vx and vy
+are known, each wheel tells w, too, and the median is right as long as most of them grip.
 """
 
 from __future__ import annotations
@@ -13,9 +16,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from statistics import median
 from typing import Final
 
 from daemon.loops.odometry import least_squares
+from profiles.schema import DriveConfig, TractionConfig
 
 Row = tuple[float, float, float]
 Motion = tuple[float, float, float]
@@ -80,6 +85,7 @@ class ObserverTuning:
         slip_m_s: rim speed above the body's at which slip begins.
         slip_ratio: part of the body's speed that is added to it; tyres creep when they pull.
         grip_part: slip ends below this part of what begins it.
+        turning_by_wheels: the median of what the wheels say of the yaw rate counts, not what forces say.
     """
 
     smoothing_s: float = 0.015
@@ -88,6 +94,7 @@ class ObserverTuning:
     slip_m_s: float = 0.06
     slip_ratio: float = 0.06
     grip_part: float = 0.6
+    turning_by_wheels: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +105,7 @@ class Observed:
         motion: of the body, whatever the wheels do.
         acceleration: of the body.
         wheel_forces_n: of the floor, along each wheel.
+        outside_m_s2: what the forces accelerate the body more than is measured: an obstacle pushes back.
         ground_m_s: speed of the floor under each wheel, along it.
         slip_m_s: rim speed minus that.
         slipping: for each wheel.
@@ -106,6 +114,7 @@ class Observed:
     motion: Motion
     acceleration: Motion
     wheel_forces_n: tuple[float, ...]
+    outside_m_s2: tuple[float, float]
     ground_m_s: tuple[float, ...]
     slip_m_s: tuple[float, ...]
     slipping: tuple[bool, ...]
@@ -137,8 +146,12 @@ class SlipObserver:
         self._still = tuple(still)
         self._tuning = ObserverTuning() if tuning is None else tuning
         self._weight = tuple(1 / max(math.fsum(row[axis] ** 2 for row in self._rows), 1e-9) for axis in range(3))
-        none = (0.0,) * len(self._rows)
-        self._last = Observed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), none, none, none, (False,) * len(self._rows))
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget everything, and believe the wheels at the next step."""
+        none, rest = (0.0,) * len(self._rows), (0.0, 0.0, 0.0)
+        self._last = Observed(rest, rest, none, (0.0, 0.0), none, none, (False,) * len(self._rows))
         self._speeds: tuple[float, ...] = ()
         self._currents: tuple[float, ...] = ()
 
@@ -166,10 +179,11 @@ class SlipObserver:
         forces = tuple(drive.floor_force(current, speed, slope) for drive, current, speed, slope in readings)
         x, y, turn = self._body.acceleration(self._rows, forces)
         acceleration = (x, y, turn) if measured is None else (*measured, turn)
-        motion = self._corrected(self._integrated(acceleration, dt), wheel_speeds, dt)
+        outside = x - acceleration[0], y - acceleration[1]
+        motion = self._corrected(self._integrated(acceleration, wheel_speeds, dt), wheel_speeds, dt)
         ground = tuple(_rolling(row, motion) for row in self._rows)
         slip = tuple(speed - floor for speed, floor in zip(wheel_speeds, ground, strict=True))
-        self._last = Observed(motion, acceleration, forces, ground, slip, self._judged(motion, slip))
+        self._last = Observed(motion, acceleration, forces, outside, ground, slip, self._judged(motion, slip))
         return self._last
 
     def _begin(self, speeds: Sequence[float], currents: Sequence[float]) -> None:
@@ -186,11 +200,17 @@ class SlipObserver:
         self._currents = tuple(old + part * (new - old) for new, old in zip(currents, self._currents, strict=True))
         return [change / dt for change in changes]
 
-    def _integrated(self, acceleration: Motion, dt: float) -> Motion:
+    def _integrated(self, acceleration: Motion, speeds: Sequence[float], dt: float) -> Motion:
         """In the body's frame, which turns: dv/dt = a - w x v."""
         vx, vy, rate = self._last.motion
         ax, ay, turn = acceleration
-        return (vx + (ax + rate * vy) * dt, vy + (ay - rate * vx) * dt, rate + turn * dt)
+        vx, vy = vx + (ax + rate * vy) * dt, vy + (ay - rate * vx) * dt
+        return (vx, vy, self._turning(vx, vy, speeds) if self._tuning.turning_by_wheels else rate + turn * dt)
+
+    def _turning(self, vx: float, vy: float, speeds: Sequence[float]) -> float:
+        """Yaw rate that most wheels tell where the body moves at (vx, vy)."""
+        told = zip(self._rows, speeds, strict=True)
+        return median((speed - cos * vx - sin * vy) / lever for (cos, sin, lever), speed in told if lever)
 
     def _corrected(self, motion: Motion, speeds: Sequence[float], dt: float) -> Motion:
         """A little nearer to what the wheels say, and less so where they slip."""
@@ -223,3 +243,12 @@ class SlipObserver:
 
 def _rolling(row: Row, motion: Motion) -> float:
     return row[0] * motion[0] + row[1] * motion[1] + row[2] * motion[2]
+
+
+def rim_drive(drive: DriveConfig, traction: TractionConfig) -> RimDrive:
+    """A drive of the profile as the observer wants it."""
+    ratio, radius, motor = drive.total_ratio, drive.wheel_radius_m, drive.motor
+    force_per_a = ratio * motor.torque_constant_n_m_a / radius
+    inertia = traction.wheel_inertia_kg_m2 + ratio * ratio * motor.rotor_inertia_kg_m2
+    friction = force_per_a * motor.no_load_current_a + traction.rolling_resistance_n
+    return RimDrive(force_per_a, inertia / radius**2, friction, drive.gear_efficiency)

@@ -22,7 +22,7 @@ LEAST_FACTOR: Final = 0.1
 
 @dataclass(frozen=True, slots=True)
 class TractionTuning:
-    """What suits a robot. The defaults are for control cycles of 10 ms and a sensor noise of 0.1 m/s2.
+    """What suits a robot. The defaults are for control cycles of 10 ms and an accelerometer's noise of 0.1 m/s2.
 
     Attributes:
         delay_cycles: from a command to the reading of the acceleration that it makes.
@@ -39,7 +39,7 @@ class TractionTuning:
         raise_by: first positive correction; doubled each time that one succeeds.
     """
 
-    delay_cycles: int = 2
+    delay_cycles: int = 1
     response_s: float = 0.02
     smoothing_s: float = 0.02
     slip_m_s2: float = 0.35
@@ -287,13 +287,3 @@ class Traction:
             return math.hypot(mx, my) / self._whole_m_s2, math.hypot(mx, my) > size
         along = (x * mx + y * my) / size
         return max(0.0, along) / self._whole_m_s2, along > size
-
-
-def limited_lead(wanted: Vector, body: Vector, lead_m_s: float) -> Vector:
-    """The wanted velocity, or the nearest one that differs from the body's by no more than a lead [m/s].
-
-    While wheels slip, commanding them faster than what pulls best only makes the slip last longer.
-    """
-    x, y = wanted[0] - body[0], wanted[1] - body[1]
-    part = min(1.0, lead_m_s / max(math.hypot(x, y), 1e-9))
-    return (body[0] + part * x, body[1] + part * y)

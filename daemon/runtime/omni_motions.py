@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import math
-from typing import Any, Protocol
+from typing import Any
 
 from canhelm.errors import DeviceFault
-from daemon.loops.accelerometer import CentreAcceleration
 from daemon.loops.measurement import Command, Measurement
-from daemon.loops.omni_drive import OmniLaw, OmniOdometry, OmniRecord
+from daemon.loops.omni_drive import OmniLaw, OmniRecord
 from daemon.loops.omni_guide import Twist, TwistGuide
+from daemon.loops.omni_senses import OmniSenses
 from daemon.loops.planner import PlanarState, Result
 from daemon.runtime.motions import Motion
 
@@ -20,18 +20,11 @@ FAILED = (Result.INVALID, Result.GOAL_TOO_FAST)
 STANDING: Twist = (0.0, 0.0, 0.0)
 
 
-class Senses(Protocol):
-    """What the vehicle knows of its own motion."""
-
-    odometry: OmniOdometry
-    acceleration: CentreAcceleration | None
-
-
 class OmniMotion(Motion):
     """A motion by the law.
 
     Args:
-        senses: pose, and acceleration of the centre.
+        senses: what the vehicle knows of its own motion.
         law: of its own.
 
     Attributes:
@@ -40,7 +33,7 @@ class OmniMotion(Motion):
         slip_steps: steps in which slip was detected.
     """
 
-    def __init__(self, kind: str, drives: tuple[str, ...], lease: str | None, senses: Senses, law: OmniLaw) -> None:
+    def __init__(self, kind: str, drives: tuple[str, ...], lease: str | None, senses: OmniSenses, law: OmniLaw) -> None:
         super().__init__(kind, drives, lease)
         self.record: OmniRecord | None = None
         self.least_factor = 1.0
@@ -52,8 +45,7 @@ class OmniMotion(Motion):
         """One step of the law; once stopped it brings the robot to rest."""
         if self.stop_reason:
             self._law.stop()
-        centre = self._senses.acceleration
-        command, record = self._law.step(self._senses.odometry.pose, centre.centre if centre else None, dt_s)
+        command, record = self._law.step(self._senses, dt_s)
         self.record = record
         if not record.stopping:
             self.least_factor = min(self.least_factor, record.guidance.safety_factor)
@@ -71,7 +63,7 @@ class OmniMotion(Motion):
 
     def numbers(self, measurement: Measurement) -> dict[str, Any]:
         """Where the robot is, and how it went."""
-        pose = self._senses.odometry.pose
+        pose = self._senses.pose
         return {
             "x_m": round(pose.x_m, 4),
             "y_m": round(pose.y_m, 4),
@@ -98,6 +90,7 @@ class OmniMotion(Motion):
             "yaw_rate_limit_deg_s": round(math.degrees(limits.rate), 3),
             "safety_factor": round(guidance.safety_factor, 3),
             "slip": list(guidance.slip),
+            "pushing": record.felt.pushing,
             "correction": guidance.correction,
             "error_m": round(math.hypot(record.error[0], record.error[1]), 4),
         }
@@ -111,7 +104,7 @@ class GoalMotion(OmniMotion):
     """
 
     def __init__(
-        self, kind: str, drives: tuple[str, ...], lease: str | None, senses: Senses, law: OmniLaw, goal: PlanarState
+        self, kind: str, drives: tuple[str, ...], lease: str | None, senses: OmniSenses, law: OmniLaw, goal: PlanarState
     ) -> None:
         super().__init__(kind, drives, lease, senses, law)
         self._goal = goal
@@ -127,7 +120,7 @@ class GoalMotion(OmniMotion):
             self._law.stop()
 
     def _at_goal(self, measurement: Measurement) -> dict[str, Any]:
-        pose, goal = self._senses.odometry.pose, self._goal
+        pose, goal = self._senses.pose, self._goal
         turn = math.remainder(goal.heading - pose.yaw_rad, math.tau)
         return {
             "result": Result.ARRIVED.value,
@@ -150,7 +143,7 @@ class TwistMotion(OmniMotion):
         kind: str,
         drives: tuple[str, ...],
         lease: str | None,
-        senses: Senses,
+        senses: OmniSenses,
         law: OmniLaw,
         guide: TwistGuide,
         duration_s: float | None,
@@ -188,7 +181,7 @@ class TwistStream(OmniMotion):
         kind: str,
         drives: tuple[str, ...],
         lease: str | None,
-        senses: Senses,
+        senses: OmniSenses,
         law: OmniLaw,
         guide: TwistGuide,
         valid_for_s: float,

@@ -7,13 +7,14 @@ from dataclasses import replace
 from typing import Any
 
 from canhelm.errors import LimitExceeded, UsageError
-from daemon.loops.accelerometer import Accelerometer, CentreAcceleration, Mounting
+from daemon.loops.accelerometer import Mounting
 from daemon.loops.measurement import Measurement
-from daemon.loops.omni_drive import OmniLaw, OmniOdometry, omni_kinematics
+from daemon.loops.omni_drive import OmniLaw
 from daemon.loops.omni_guide import GoalGuide, Guide, PublishedGuide, Signals, Twist, TwistGuide
+from daemon.loops.omni_senses import OmniSenses, omni_kinematics, omni_observer
 from daemon.loops.planner import FARTHEST, PlanarLimits, PlanarState
 from daemon.loops.slip import THRESHOLD_M_S2
-from daemon.loops.traction import Traction
+from daemon.loops.traction import Traction, TractionTuning
 from daemon.runtime.motions import Motion
 from daemon.runtime.omni_motions import GoalMotion, OmniMotion, TwistMotion, TwistStream
 from daemon.runtime.rest import AT_REST_M_S
@@ -24,6 +25,8 @@ from profiles.schema import OmniGeometry, Profile
 
 SLOWEST_M_S = 1e-3
 """Slowest speed limit that is planned with."""
+SLIP_BY_CURRENTS_M_S2, GRIP_BY_CURRENTS_M_S2 = 0.5, 0.35
+"""Levels at which slip begins and ends where currents tell the acceleration: above their errors while it turns."""
 _ROUNDING = 1e-9
 
 
@@ -33,10 +36,10 @@ class OmniVehicle(Vehicle):
     Args:
         profile: the robot.
         drives: of its wheels.
-        sensor: its accelerometer; without one there is no traction loop.
+        sensor: its accelerometer; without one the motors' currents tell slip.
 
     Attributes:
-        traction: whether motions by the time-optimal planner heed the floor's grip.
+        senses: what it knows of its own motion.
     """
 
     methods = ("drive.to", "drive.parallel", "drive.rotate", "drive.set")
@@ -46,7 +49,6 @@ class OmniVehicle(Vehicle):
         super().__init__(profile, drives, wheel_acceleration_m_s2=slowest)
         assert isinstance(profile.vehicle, OmniGeometry)
         limits = profile.limits
-        self.traction = True
         self.limits = PlanarLimits(
             limits.speed_m_s,
             limits.acceleration_m_s2,
@@ -54,34 +56,25 @@ class OmniVehicle(Vehicle):
             math.radians(limits.yaw_acceleration_deg_s2),
         )
         self._kinematics = omni_kinematics(profile.vehicle)
-        self.odometry = OmniOdometry(self._kinematics)
         self._names = tuple(drive.name for drive in drives)
         self._sensor = sensor
         self._period_s = 1.0 / profile.network.cycle_hz
         config = profile.accelerometer
         mounting = Mounting(config.x_m, config.y_m, math.radians(config.rotation_deg)) if config else Mounting()
-        self._centre = Accelerometer(mounting)
-        self.acceleration: CentreAcceleration | None = None
+        self.senses = OmniSenses(self._kinematics, mounting, omni_observer(profile, self._kinematics))
         self._last_s = -math.inf
 
     # --- measuring ---------------------------------------------------------------------------------------------
 
     def measure(self, now_s: float) -> Measurement:
-        """The newest readings; pose and acceleration of the centre by them."""
-        reading = self._sensor.acceleration_m_s2 if self._sensor else None
-        measurement = self._readings(now_s, reading)
-        self.odometry.update(measurement)
+        """The newest readings; pose, acceleration of the centre and slip by them."""
+        measurement = self._readings(now_s, self._sensor.acceleration_m_s2 if self._sensor else None)
         dt_s, self._last_s = min(now_s - self._last_s, 5 * self._period_s), now_s
-        self.acceleration = None
-        if reading is not None:
-            self.acceleration = self._centre.step(reading, self.odometry.motion[2], dt_s, self._stands(measurement))
+        off = [drive.state is DriveState.DISABLED for drive in self.drives]
+        slow = all(abs(speed) < AT_REST_M_S for speed in measurement.wheel_speed_m_s)
+        powered = any(drive.state is DriveState.ENABLED for drive in self.drives)
+        self.senses.update(measurement, dt_s, powered=powered, standing=all(off) and slow)
         return measurement
-
-    def _stands(self, measurement: Measurement) -> bool:
-        """Whether the robot certainly stands: no wheel turns, no drive has power."""
-        if any(drive.state is not DriveState.DISABLED for drive in self.drives):
-            return False
-        return all(abs(speed) < AT_REST_M_S for speed in measurement.wheel_speed_m_s)
 
     # --- motions -----------------------------------------------------------------------------------------------
 
@@ -94,8 +87,8 @@ class OmniVehicle(Vehicle):
         twist = self._twist(method, params)
         law, guide = self._on_twist(twist)
         if method == "drive.set":
-            return TwistStream(method, self._names, lease, self, law, guide, float(params["valid_for_ms"]) / 1e3)
-        return TwistMotion(method, self._names, lease, self, law, guide, params.get("duration_s"))
+            return TwistStream(method, self._names, lease, self.senses, law, guide, float(params["valid_for_ms"]) / 1e3)
+        return TwistMotion(method, self._names, lease, self.senses, law, guide, params.get("duration_s"))
 
     def update(
         self, method: str, params: dict[str, Any], lease: str | None, motions: list[Motion]
@@ -141,11 +134,11 @@ class OmniVehicle(Vehicle):
             guide = PublishedGuide(goal, limits, self._period_s, signals, threshold_m_s2)
         else:
             guide = GoalGuide(goal, limits, self._new_traction(limits.acceleration))
-        return GoalMotion(kind, self._names, lease, self, self._law(guide), goal)
+        return GoalMotion(kind, self._names, lease, self.senses, self._law(guide), goal)
 
     def _to(self, params: dict[str, Any], lease: str | None) -> Motion:
         heading, speed = params.get("heading_deg"), params.get("speed_m_s")
-        yaw = self.odometry.pose.yaw_rad if heading is None else math.radians(heading)
+        yaw = self.senses.pose.yaw_rad if heading is None else math.radians(heading)
         goal = PlanarState(
             params["x_m"], params["y_m"], yaw, params.get("end_vx_m_s", 0.0), params.get("end_vy_m_s", 0.0)
         )
@@ -154,7 +147,7 @@ class OmniVehicle(Vehicle):
 
     def _parallel(self, params: dict[str, Any], lease: str | None) -> Motion:
         """The way that speed and duration make, as a goal."""
-        pose, speed = self.odometry.pose, float(params["speed_m_s"])
+        pose, speed = self.senses.pose, float(params["speed_m_s"])
         angle, way = pose.yaw_rad + math.radians(params["angle_deg"]), speed * float(params["duration_s"])
         goal = PlanarState(pose.x_m + way * math.cos(angle), pose.y_m + way * math.sin(angle), pose.yaw_rad)
         limits = replace(self.limits, speed=max(abs(speed), SLOWEST_M_S))
@@ -177,11 +170,17 @@ class OmniVehicle(Vehicle):
         return self._law(guide), guide
 
     def _new_traction(self, acceleration_m_s2: float) -> Traction | None:
-        return Traction(acceleration_m_s2) if self.traction and self._sensor is not None else None
+        config = self.profile.traction
+        if config is None or not self.senses.observing:
+            return None
+        tuning = TractionTuning(response_s=config.response_s)
+        if self._sensor is None:
+            tuning = replace(tuning, slip_m_s2=SLIP_BY_CURRENTS_M_S2, grip_m_s2=GRIP_BY_CURRENTS_M_S2)
+        return Traction(acceleration_m_s2, tuning)
 
     def _law(self, guide: Guide) -> OmniLaw:
-        odometry = self.odometry
-        return OmniLaw(self._kinematics, guide, self.limits, odometry.pose, odometry.motion)
+        published = isinstance(guide, PublishedGuide)
+        return OmniLaw(self._kinematics, guide, self.limits, self.senses, answers_slip=not published)
 
     def _check(self, goal: PlanarState, limits: PlanarLimits) -> None:
         numbers = (goal.x, goal.y, goal.heading, goal.vx, goal.vy, limits.speed, limits.acceleration)
@@ -196,8 +195,7 @@ class OmniVehicle(Vehicle):
 
     def status(self) -> dict[str, Any]:
         """Odometry, motion and acceleration of the centre."""
-        pose, (vx, vy, rate) = self.odometry.pose, self.odometry.motion
-        centre = self.acceleration.centre if self.acceleration else None
+        pose, (vx, vy, rate), centre = self.senses.pose, self.senses.motion, self.senses.acceleration
         return {
             "type": OmniGeometry.type,
             "methods": list(self.methods),

@@ -1,20 +1,22 @@
-"""The planner and traction control around the robot on ice: one drive, by one of three ways to answer slip."""
+"""The law of the omni-wheel vehicle on a floor with ice: one drive, by one of three ways to answer slip."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from enum import StrEnum
 from itertools import pairwise
 from typing import Protocol
 
-from daemon.loops.accelerometer import Accelerometer, Mounting, Vector, rotated
+from daemon.loops.accelerometer import Mounting, Vector
+from daemon.loops.measurement import Measurement
 from daemon.loops.omni import OmniKinematics, turtle_wheels
-from daemon.loops.planner import PlanarLimits, PlanarState, Tolerance, follow, plan_motion
-from daemon.loops.published_planner_axis import AxisCase
-from daemon.loops.published_traction import SafetyFactor as PublishedFactor
-from daemon.loops.slip import AxisSlipDetector
-from daemon.loops.slip_observer import Body, Observed, RimDrive, SlipObserver
-from daemon.loops.traction import Traction, TractionRecord, TractionTuning, limited_lead
+from daemon.loops.omni_drive import OmniLaw, OmniRecord
+from daemon.loops.omni_guide import GoalGuide, Guide, PublishedGuide
+from daemon.loops.omni_senses import BY_ACCELEROMETER, BY_CURRENTS, OmniSenses
+from daemon.loops.planner import PlanarLimits, PlanarState, Result
+from daemon.loops.slip_observer import Body, RimDrive, SlipObserver
+from daemon.loops.traction import Traction, TractionTuning
 from vcan_tests.daemon import omni_floor
 from vcan_tests.daemon.omni_floor import CYCLE_S
 
@@ -22,7 +24,6 @@ KINEMATICS = OmniKinematics(turtle_wheels(0.2, 0.2, 0.2))
 PLACE, ROTATION = omni_floor.SENSOR
 DRIVE = RimDrive(omni_floor.FORCE_PER_A, omni_floor.RIM_MASS_KG, omni_floor.FRICTION_N, omni_floor.EFFICIENCY)
 BODY = Body(omni_floor.MASS_KG, omni_floor.YAW_INERTIA)
-TOLERANCE = Tolerance(0.05, 0.1, 0.1, 0.5)
 LONGEST_S = 12.0
 
 
@@ -37,7 +38,13 @@ class RobotData:
     tuning: TractionTuning = field(default_factory=TractionTuning)
 
 
-FLOOR_ROBOT = RobotData(PlanarLimits(1.5, 1.5, 3.0, 6.0), DRIVE, BODY, Mounting(PLACE.real, PLACE.imag, ROTATION))
+FLOOR_ROBOT = RobotData(
+    PlanarLimits(1.5, 1.5, 3.0, 6.0),
+    DRIVE,
+    BODY,
+    Mounting(PLACE.real, PLACE.imag, ROTATION),
+    TractionTuning(delay_cycles=2),
+)
 SLIPS_M_S = 0.06
 """True slip speed of a wheel that counts as slip."""
 TOGETHER_S = 0.1
@@ -50,13 +57,9 @@ class Cycle:
 
     time: float
     place: complex
-    heading: float
-    planned: PlanarState
     factor: float
     slip: bool
     true_slip: float
-    record: TractionRecord | None
-    observed: Observed | None
 
 
 @dataclass
@@ -72,10 +75,6 @@ class Drive:
 
     def factor_changes(self) -> int:
         return sum(a.factor != b.factor for a, b in pairwise(self.cycles))
-
-    def factor_travel(self) -> float:
-        """Sum of all changes of the safety factor."""
-        return sum(abs(a.factor - b.factor) for a, b in pairwise(self.cycles))
 
     def turned_round(self) -> int:
         """Times that the safety factor changed its direction."""
@@ -126,161 +125,64 @@ class Floor(Protocol):
     def roll(self, rim_targets: tuple[float, ...]) -> None: ...
 
 
-class Answer:
-    """No answer to slip at all."""
+class Way(StrEnum):
+    """How slip is answered."""
 
-    factor = 1.0
-    slip = False
-    record: TractionRecord | None = None
-
-    def step(self, measured: Vector, commanded: Vector, cruising: bool, overshoot: bool, slipping: bool) -> None:
-        """One cycle."""
+    OFF = "off"
+    PUBLISHED = "published"
+    IMPROVED = "improved"
 
 
-class PublishedAnswer(Answer):
-    """As the report prints it."""
-
-    def __init__(self, threshold: float = 0.1) -> None:
-        self._detectors = (AxisSlipDetector(threshold), AxisSlipDetector(threshold))
-        self._factor = PublishedFactor()
-
-    def step(self, measured: Vector, commanded: Vector, cruising: bool, overshoot: bool, slipping: bool) -> None:
-        case = AxisCase.TOP_SPEED if cruising else AxisCase.TO_TOP_SPEED
-        x, y = (
-            detector.step(of, wanted, case)
-            for detector, of, wanted in zip(self._detectors, measured, commanded, strict=True)
-        )
-        self._factor.limit(1.0, (x, y))
-        self.factor, self.slip = self._factor.factor, x or y
-
-
-class ImprovedAnswer(Answer):
-    """As it should be."""
-
-    def __init__(self, robot: RobotData = FLOOR_ROBOT) -> None:
-        self._traction = Traction(robot.limits.acceleration, robot.tuning)
-
-    def step(self, measured: Vector, commanded: Vector, cruising: bool, overshoot: bool, slipping: bool) -> None:
-        self.record = self._traction.step(measured, commanded, CYCLE_S, cruising, overshoot, slipping=slipping)
-        self.factor, self.slip = self.record.safety_factor, self.record.signal.slip or slipping
-
-
-SLIP_M_S = 0.03
-LAG_S = 0.04
-"""From a command to the motion that it makes."""
+def guide(way: Way, goal: PlanarState, robot: RobotData) -> Guide:
+    """What leads the robot to a goal."""
+    if way is Way.PUBLISHED:
+        return PublishedGuide(goal, robot.limits, CYCLE_S, None, 0.1)
+    traction = Traction(robot.limits.acceleration, robot.tuning) if way is Way.IMPROVED else None
+    return GoalGuide(goal, robot.limits, traction)
 
 
 class Daemon:
-    """Odometry, planner and traction as one cycle of control.
+    """The law of the omni-wheel vehicle on a floor."""
 
-    Args:
-        start: state of the robot.
-        goal: where to.
-        answer: to slip. Without one (:class:`Answer` itself) the wheels are believed, else the observer is.
-        by_currents: there is no accelerometer.
-        robot: its data.
-    """
+    def __init__(self, floor: Floor, goal: PlanarState, way: Way, by_currents: bool, robot: RobotData) -> None:
+        self._floor = floor
+        self._by_currents = by_currents
+        tuning = BY_CURRENTS if by_currents else BY_ACCELEROMETER
+        observer = SlipObserver(robot.body, [robot.drive] * 3, KINEMATICS.forward, tuning=tuning)
+        self.senses = OmniSenses(KINEMATICS, robot.mounting, observer if way is Way.IMPROVED else None)
+        self._travel = [0.0, 0.0, 0.0]
+        self._feel(0.0)
+        self.law = OmniLaw(KINEMATICS, guide(way, goal, robot), robot.limits, self.senses)
 
-    def __init__(
-        self, start: PlanarState, goal: PlanarState, answer: Answer, by_currents: bool, robot: RobotData
-    ) -> None:
-        self._goal = goal
-        self._all = robot.limits
-        self._answer = answer
-        self._sensor = None if by_currents else Accelerometer(robot.mounting)
-        self._observer = SlipObserver(robot.body, [robot.drive] * 3, KINEMATICS.forward)
-        self._believes_wheels = type(answer) is Answer
-        self._pose = self.target = start
-        self._yaw_rate = 0.0
-        self._commanded: Vector = (0.0, 0.0)
-        self.plan = plan_motion(start, goal, robot.limits)
-        self.observed: Observed | None = None
+    def step(self, now: float) -> OmniRecord:
+        """One cycle: feel, decide, roll."""
+        self._feel(now)
+        command, record = self.law.step(self.senses, CYCLE_S)
+        self._floor.roll(command.wheel_speed_m_s)
+        return record
 
-    def step(self, floor: Floor, now: float) -> tuple[float, ...]:
-        """Rim speeds to command."""
-        measured = None
-        if self._sensor is not None:
-            measured = self._sensor.step(floor.reading, self._yaw_rate, CYCLE_S).centre
-        self.observed = seen = self._observer.step(floor.rims, floor.currents, CYCLE_S, measured)
-        self._yaw_rate = seen.motion[2]
-        self._move(KINEMATICS.body_motion(floor.rims) if self._believes_wheels else seen.motion)
-        acceleration = rotated((seen.acceleration[0], seen.acceleration[1]), self._pose.heading)
-        cruising = self.plan.way.case(now - self.plan.began) == "cruise"
-        factor = self._answer.factor
-        overshoot = _passes(self._pose, self._goal, factor * self._all.acceleration)
-        self._answer.step(acceleration, self._commanded, cruising, overshoot, any(seen.slipping))
-        start = self._start(any(seen.slipping) and not self._believes_wheels)
-        if self._answer.factor != factor:
-            self.plan = plan_motion(start, self._goal, self._limits(), now)
-        step = follow(self.plan, now, start, CYCLE_S, TOLERANCE)
-        self.plan, self._commanded, self.target = step.plan, step.acceleration_m_s2, step.next
-        ahead = rotated((self.target.vx, self.target.vy), -self._pose.heading)
-        return KINEMATICS.wheel_speeds((*ahead, self.target.rate))
-
-    def _limits(self) -> PlanarLimits:
-        factor = self._answer.factor
-        turn = max(0.3, factor) * self._all.angular_acceleration
-        return replace(self._all, acceleration=factor * self._all.acceleration, angular_acceleration=turn)
-
-    def _move(self, motion: tuple[float, float, float]) -> None:
-        """Odometry."""
-        pose = self._pose
-        vx, vy = rotated((motion[0], motion[1]), pose.heading)
-        x, y, heading = pose.x + vx * CYCLE_S, pose.y + vy * CYCLE_S, pose.heading + motion[2] * CYCLE_S
-        self._pose = PlanarState(x, y, heading, vx, vy, motion[2])
-
-    def _start(self, slipping: bool) -> PlanarState:
-        """Where the robot will be when a command of now takes effect.
-
-        Where nothing slips it will be as fast as commanded, and else little faster or slower than it is.
-        """
-        pose, target = self._pose, self.target
-        vx, vy, rate = target.vx, target.vy, target.rate
-        if slipping:
-            lead = SLIP_M_S + LAG_S * self._all.acceleration * self._answer.factor
-            vx, vy = limited_lead((vx, vy), (pose.vx, pose.vy), lead)
-            rate = pose.rate + max(-lead / 0.2, min(lead / 0.2, rate - pose.rate))
-        return PlanarState(
-            pose.x + LAG_S * (pose.vx + vx) / 2,
-            pose.y + LAG_S * (pose.vy + vy) / 2,
-            pose.heading + LAG_S * (pose.rate + rate) / 2,
-            vx,
-            vy,
-            rate,
-        )
+    def _feel(self, now: float) -> None:
+        floor = self._floor
+        self._travel = [way + speed * CYCLE_S for way, speed in zip(self._travel, floor.rims, strict=True)]
+        rims, currents = tuple(floor.rims), tuple(floor.currents)
+        reading = None if self._by_currents else floor.reading
+        measurement = Measurement(now, rims, tuple(self._travel), acceleration_m_s2=reading, motor_current_a=currents)
+        self.senses.update(measurement, CYCLE_S, powered=True, standing=False)
 
 
 def drive(
-    floor: Floor, goal: PlanarState, answer: Answer, *, by_currents: bool = False, robot: RobotData = FLOOR_ROBOT
+    floor: Floor, goal: PlanarState, way: Way, *, by_currents: bool = False, robot: RobotData = FLOOR_ROBOT
 ) -> Drive:
     """Drive to a goal."""
     driven = Drive()
-    daemon = Daemon(PlanarState(vx=floor.velocity.real, vy=floor.velocity.imag), goal, answer, by_currents, robot)
+    daemon = Daemon(floor, goal, way, by_currents, robot)
     for number in range(round(LONGEST_S / CYCLE_S)):
         now = number * CYCLE_S
         slip = max(map(abs, floor.slips))
-        floor.roll(daemon.step(floor, now))
-        driven.cycles.append(
-            Cycle(
-                now,
-                floor.place,
-                floor.heading,
-                daemon.target,
-                answer.factor,
-                answer.slip,
-                slip,
-                answer.record,
-                daemon.observed,
-            )
-        )
-        if driven.arrived_s == math.inf and now >= daemon.plan.ends:
+        told = daemon.step(now).guidance
+        driven.cycles.append(Cycle(now, floor.place, told.safety_factor, any(told.slip), slip))
+        if driven.arrived_s == math.inf and told.result is Result.ARRIVED:
             driven.arrived_s = now
         if now > driven.arrived_s + 0.3:
             break
     return driven
-
-
-def _passes(pose: PlanarState, goal: PlanarState, acceleration: float) -> bool:
-    """Whether the goal is nearer than the way to rest."""
-    left = math.hypot(goal.x - pose.x, goal.y - pose.y)
-    return left > 0.02 and pose.vx**2 + pose.vy**2 > 2 * acceleration * left * 1.02

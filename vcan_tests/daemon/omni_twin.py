@@ -7,9 +7,8 @@ import math
 import msgspec
 
 from daemon.loops.accelerometer import Mounting, Vector
-from daemon.loops.paired_traction import rim_drive
 from daemon.loops.planner import PlanarLimits
-from daemon.loops.slip_observer import Body
+from daemon.loops.slip_observer import Body, rim_drive
 from daemon.loops.traction import TractionTuning
 from drivers.simulated.omni import OmniWorld
 from profiles.loader import load
@@ -30,11 +29,10 @@ def turtle(**patches: FloorPatch) -> Profile:
 
 def robot_data(profile: Profile) -> RobotData:
     """What the loops know of it, by its profile."""
-    vehicle, simulation, sensor, limits = _parts(profile), profile.simulation, profile.accelerometer, profile.limits
-    assert simulation is not None
+    vehicle, sensor, limits = _parts(profile), profile.accelerometer, profile.limits
     assert sensor is not None
     drive = next(iter(profile.drives.values()))
-    rolling_n = simulation.tyre.rolling_resistance * vehicle.mass_kg * 9.81 / 3
+    assert profile.traction is not None
     return RobotData(
         PlanarLimits(
             limits.speed_m_s,
@@ -42,7 +40,7 @@ def robot_data(profile: Profile) -> RobotData:
             math.radians(limits.yaw_rate_deg_s),
             math.radians(limits.yaw_acceleration_deg_s2),
         ),
-        rim_drive(drive, simulation.wheel_inertia_kg_m2, rolling_n),
+        rim_drive(drive, profile.traction),
         Body(vehicle.mass_kg, vehicle.yaw_inertia_kg_m2),
         Mounting(sensor.x_m, sensor.y_m, math.radians(sensor.rotation_deg)),
         TractionTuning(response_s=0.04),

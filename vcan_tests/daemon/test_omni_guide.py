@@ -8,11 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from daemon.loops.accelerometer import Mounting
 from daemon.loops.measurement import Measurement
 from daemon.loops.odometry import Pose
 from daemon.loops.omni import OmniKinematics, turtle_wheels
-from daemon.loops.omni_drive import OmniLaw, OmniOdometry
-from daemon.loops.omni_guide import GoalGuide, Guidance, Guide, TwistGuide
+from daemon.loops.omni_drive import OmniLaw
+from daemon.loops.omni_guide import Felt, GoalGuide, Guidance, Guide, TwistGuide
+from daemon.loops.omni_senses import OmniOdometry, OmniSenses
 from daemon.loops.planner import PlanarLimits, PlanarState, Result
 from daemon.loops.traction import Traction
 
@@ -21,12 +23,17 @@ KINEMATICS = OmniKinematics(turtle_wheels(0.2, 0.22, 0.18))
 DT = 0.01
 
 
+def blind() -> OmniSenses:
+    """A robot that knows its wheels alone."""
+    return OmniSenses(KINEMATICS, Mounting(), None)
+
+
 def lead(guide: Guide, start: PlanarState, steps: int = 2000) -> list[Guidance]:
     """The reference of a robot that follows exactly."""
     told: list[Guidance] = []
     state, acceleration = start, (0.0, 0.0)
     while len(told) < steps and (not told or told[-1].result is Result.MOVING):
-        told.append(guide.step(state, None, acceleration, DT))
+        told.append(guide.step(state, Felt(), acceleration, DT))
         state, acceleration = told[-1].next, told[-1].acceleration_m_s2
     return told
 
@@ -44,7 +51,7 @@ def test_a_floor_that_grips_less_lowers_the_acceleration_at_once() -> None:
     guide = GoalGuide(PlanarState(3.0), LIMITS, Traction(1.2))
     state, commanded, last = PlanarState(), (0.0, 0.0), None
     for _ in range(60):
-        last = guide.step(state, (0.25 * commanded[0], 0.0), commanded, DT)
+        last = guide.step(state, Felt((0.25 * commanded[0], 0.0)), commanded, DT)
         state, commanded = last.next, last.acceleration_m_s2
     assert last is not None
     assert last.safety_factor < 0.5
@@ -58,7 +65,7 @@ def test_a_twist_is_reached_within_the_limits(
     guide = TwistGuide((forward, left, rate), LIMITS)
     state = PlanarState(vx=start_vx, rate=start_rate)
     for _ in range(400):
-        told = guide.step(state, None, (0.0, 0.0), DT)
+        told = guide.step(state, Felt(), (0.0, 0.0), DT)
         assert math.hypot(*told.acceleration_m_s2) <= 1.2 * (1 + 1e-9)
         assert abs(told.next.rate - state.rate) <= 2.0 * DT * (1 + 1e-9)
         state = told.next
@@ -66,14 +73,15 @@ def test_a_twist_is_reached_within_the_limits(
 
 
 def test_a_stopped_law_comes_to_rest_and_is_done() -> None:
-    law = OmniLaw(KINEMATICS, TwistGuide((0.5, 0.0, 0.0), LIMITS), LIMITS, Pose(), (0.0, 0.0, 0.0))
-    pose, done = Pose(), False
+    senses = blind()
+    law = OmniLaw(KINEMATICS, TwistGuide((0.5, 0.0, 0.0), LIMITS), LIMITS, senses)
+    travel, done = [0.0, 0.0, 0.0], False
     for cycle in range(300):
         if cycle == 100:
             law.stop()
-        command, record = law.step(pose, None, DT)
-        vx, vy, _ = KINEMATICS.body_motion(command.wheel_speed_m_s)
-        pose = Pose(pose.x_m + vx * DT, pose.y_m + vy * DT, 0.0)
+        command, record = law.step(senses, DT)
+        travel = [way + speed * DT for way, speed in zip(travel, command.wheel_speed_m_s, strict=True)]
+        senses.update(Measurement(cycle * DT, command.wheel_speed_m_s, tuple(travel)), DT, powered=True, standing=False)
         done = done or record.done
         assert record.stopping is (cycle >= 100)
     assert done
@@ -81,12 +89,17 @@ def test_a_stopped_law_comes_to_rest_and_is_done() -> None:
 
 
 def test_the_law_never_corrects_by_more_than_it_may() -> None:
-    law = OmniLaw(KINEMATICS, TwistGuide((0.0, 0.0, 0.0), LIMITS), LIMITS, Pose(), (0.0, 0.0, 0.0))
-    command, record = law.step(Pose(5.0, -7.0, 2.0), None, DT)
+    law = OmniLaw(KINEMATICS, TwistGuide((0.0, 0.0, 0.0), LIMITS), LIMITS, blind())
+    displaced = blind()
+    rolled = KINEMATICS.wheel_speeds((0.1, -0.14, 0.2))
+    for step in range(4):
+        travel = tuple(step * way for way in rolled)
+        displaced.update(Measurement(step * DT, (0.0, 0.0, 0.0), travel), DT, powered=True, standing=False)
+    command, record = law.step(displaced, DT)
     vx, vy, rate = KINEMATICS.body_motion(command.wheel_speed_m_s)
     assert math.hypot(vx, vy) == pytest.approx(0.3)
     assert abs(rate) == pytest.approx(0.3)
-    assert record.error[:2] == (-5.0, 7.0)
+    assert record.error[:2] == (-displaced.pose.x_m, -displaced.pose.y_m)
 
 
 def test_odometry_adds_up_an_arc_exactly() -> None:

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from daemon.loops.paired_traction import PairedTraction, PairedTractionRecord, rim_drive
-from daemon.loops.slip_observer import RimDrive
+from daemon.loops.paired_traction import PairedTraction, PairedTractionRecord
+from daemon.loops.slip_observer import RimDrive, rim_drive
 from drivers.simulated.tyre import Contact
+from profiles.schema import TractionConfig
 from vcan_tests.drivers.max2d_bench import (
     PROFILE,
     Robot,
@@ -97,8 +98,11 @@ class Bench:
 
 def drives() -> list[RimDrive]:
     load_n = vehicle().mass_kg * 9.81 / 4
-    rolling = simulation().tyre.rolling_resistance * load_n
-    return [rim_drive(PROFILE.drives[name], simulation().wheel_inertia_kg_m2, rolling) for name in vehicle().wheels]
+    rolling_n = simulation().tyre.rolling_resistance * load_n
+    traction = TractionConfig(
+        response_s=0.02, wheel_inertia_kg_m2=simulation().wheel_inertia_kg_m2, rolling_resistance_n=rolling_n
+    )
+    return [rim_drive(PROFILE.drives[name], traction) for name in vehicle().wheels]
 
 
 STRAIGHT = [0.8] * 4

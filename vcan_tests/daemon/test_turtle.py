@@ -30,11 +30,12 @@ def vehicle_of(robot: Robot) -> OmniVehicle:
     return robot.app.vehicle
 
 
-def on_ice(friction: float) -> Profile:
-    """The turtle with a strip of ice across its way."""
-    assert TURTLE.simulation is not None
+def iced(profile: Profile, friction: float) -> Profile:
+    """The robot with a strip of ice across its way."""
+    assert profile.simulation is not None
     ice = FloorPatch(x_m=0.6, y_m=0.0, length_m=0.8, width_m=3.0, friction=friction)
-    return msgspec.structs.replace(TURTLE, simulation=msgspec.structs.replace(TURTLE.simulation, floor={"ice": ice}))
+    simulation = msgspec.structs.replace(profile.simulation, floor={"ice": ice})
+    return msgspec.structs.replace(profile, simulation=simulation)
 
 
 def pose_of(robot: Robot) -> tuple[float, float, float]:
@@ -197,7 +198,7 @@ async def test_the_acceleration_of_the_centre_comes_over_the_bus_free_of_the_sen
 
         def look() -> None:
             nonlocal readings
-            acceleration = vehicle_of(robot).acceleration
+            acceleration = vehicle_of(robot).senses.centre
             assert acceleration is not None
             sums[0], sums[1], readings = (
                 sums[0] + acceleration.centre[0],
@@ -214,7 +215,7 @@ async def test_the_acceleration_of_the_centre_comes_over_the_bus_free_of_the_sen
 
 
 async def test_an_ice_patch_makes_slip_that_the_loop_detects_and_answers() -> None:
-    async with running_robot(on_ice(0.04)) as robot:
+    async with running_robot(iced(TURTLE, 0.04)) as robot:
         slid = 0
         motions: list[OmniMotion] = []
 
@@ -247,9 +248,10 @@ async def test_the_published_planner_drives_there_too() -> None:
         assert math.dist(pose_of(robot)[:2], (1.0, 0.5)) < 0.015
 
 
-async def test_a_robot_without_accelerometer_drives_without_traction_loop() -> None:
+async def test_a_robot_with_neither_accelerometer_nor_traction_drives_without_the_loop() -> None:
     drives = {name: msgspec.structs.replace(drive, analog_inputs=False) for name, drive in TURTLE.drives.items()}
-    async with running_robot(msgspec.structs.replace(TURTLE, accelerometer=None, drives=drives)) as robot:
+    plain = msgspec.structs.replace(TURTLE, accelerometer=None, traction=None, drives=drives)
+    async with running_robot(plain) as robot:
         result = await robot.call("drive.to", x_m=0.5, y_m=0.5)
         assert result["error_m"] < 0.003
         assert robot.app.service.status()["vehicle"]["acceleration_m_s2"] is None
@@ -266,3 +268,66 @@ async def test_one_motor_turns_by_itself() -> None:
         await robot.call("motor.velocity", node="wheel_2", velocity_rpm=300.0, duration_s=0.5)
         assert robot.fastest_wheel_m_s < 0.01
         assert robot.state == "idle"
+
+
+def without_accelerometer() -> Profile:
+    """The turtle with drives whose currents tell slip: without a ramp of their own in each cycle."""
+    drives = {
+        name: msgspec.structs.replace(drive, analog_inputs=False, mode="velocity")
+        for name, drive in TURTLE.drives.items()
+    }
+    return msgspec.structs.replace(TURTLE, accelerometer=None, drives=drives)
+
+
+@pytest.mark.parametrize("goal", [(3.0, 0.0, 0.0), (-1.5, 1.2, 0.0), (1.5, 0.5, 150.0)])
+async def test_without_accelerometer_dry_floor_is_not_taken_for_ice(goal: tuple[float, float, float]) -> None:
+    async with running_robot(without_accelerometer()) as robot:
+        result = await robot.call("drive.to", x_m=goal[0], y_m=goal[1], heading_deg=goal[2])
+        assert (result["slip_steps"], result["least_safety_factor"]) == (0, 1.0)
+        assert result["error_m"] < 0.003
+
+
+async def test_without_accelerometer_the_currents_tell_slip_and_the_loop_answers() -> None:
+    asides = []
+    for observing in (False, True):
+        async with running_robot(iced(without_accelerometer(), 0.08)) as robot:
+            vehicle_of(robot).senses.observing = observing
+            result = await robot.call("drive.to", x_m=3.0, y_m=0.0)
+            asides.append(abs(pose_of(robot)[1]))
+            assert (result["slip_steps"] > 0) is observing
+    assert asides[1] < 0.8 * asides[0]
+
+
+async def test_a_robot_that_pushes_a_wall_holds_its_wheels_near_their_best_pull(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A wall is no ice: the factor stays, and no wheel spins at the half metre a second that is commanded."""
+    async with running_robot(TURTLE) as robot:
+        world, vehicle = world_of(robot), vehicle_of(robot)
+        slips: list[float] = []
+        pushing: list[bool] = []
+        free = world._move
+
+        def against_a_wall(force_x: float, force_y: float, yaw_acceleration: float, dt: float) -> None:
+            (x, _, yaw), (vx, _, rate) = world.pose, world.velocity
+            flat = (4e4 * (x - 0.4) + 600.0 * vx, 400.0 * yaw + 40.0 * rate) if x > 0.4 else (0.0, 0.0)
+            free(force_x - flat[0], force_y, yaw_acceleration - flat[1], dt)
+
+        def look() -> None:
+            slips.append(max(map(abs, world.slip_m_s)))
+            pushing.append(vehicle.senses.pushing)
+
+        monkeypatch.setattr(world, "_move", against_a_wall)
+        driving = asyncio.create_task(robot.call("drive.to", x_m=2.0, y_m=0.0, speed_m_s=0.5))
+        await robot.until(lambda: vehicle.senses.pushing)
+        await asyncio.sleep(0.3)
+        robot.app.supervisor.observers.append(look)
+        await asyncio.sleep(1.0)
+        robot.app.supervisor.observers.remove(look)
+        (motion,) = robot.app.service.status()["motions"]
+        await robot.call("stop")
+        with pytest.raises(Refused):
+            await driving
+    assert sum(pushing) > 0.8 * len(pushing)
+    assert max(slips) < 0.3
+    assert motion["safety_factor"] == 1.0
