@@ -1,4 +1,4 @@
-"""Where the user-mode kernel comes from: Debian's package ``user-mode-linux``, unpacked into a cache, not installed."""
+"""Where the user-mode kernel and its udev come from: Debian's packages, fetched into a cache, not installed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 from vcan_tests.kernel.errors import MissingTool
 from vcan_tests.kernel.registers import needs_wide_registers, wide_registers
 
-PACKAGE = "user-mode-linux"
+PACKAGE, DEVICES = "user-mode-linux", "udev"
 
 
 @dataclass(frozen=True)
@@ -39,24 +39,38 @@ def fetch_kernel() -> Kernel:
     if not root.exists():
         root.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=root.parent) as folder:
-            _unpack(_download(Path(folder)), Path(folder) / "root")
+            _unpack(_download(PACKAGE, Path(folder)), Path(folder) / "root")
             _publish(Path(folder) / "root", root)
     return _kernel_in(root)
 
 
-def _download(folder: Path) -> Path:
+def fetch_udev() -> Path:
+    """The file of Debian's package with the device manager, for a guest with a systemd; downloaded at the first call.
+
+    Raises:
+        MissingTool: it can't be had here.
+    """
+    file = cache() / f"{DEVICES}.deb"
+    if not file.exists():
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=file.parent) as folder:
+            _download(DEVICES, Path(folder)).rename(file)
+    return file
+
+
+def _download(package: str, folder: Path) -> Path:
     """The package file; the list of packages is fetched first where a machine has none yet."""
-    download = ["apt-get", "download", "-qq", PACKAGE]
+    download = ["apt-get", "download", "-qq", package]
     try:
         if subprocess.run(download, cwd=folder, capture_output=True).returncode:
             subprocess.run(["apt-get", "update", "-qq"], check=True)
             subprocess.run(download, cwd=folder, check=True)
     except (OSError, subprocess.CalledProcessError) as error:
         raise MissingTool(
-            f"the package {PACKAGE} can't be downloaded ({error}); on Debian run 'apt-get update' as root and try "
+            f"the package {package} can't be downloaded ({error}); on Debian run 'apt-get update' as root and try "
             f"again, elsewhere use a kernel with vcan: modprobe vcan"
         ) from error
-    return next(folder.glob(f"{PACKAGE}_*.deb"))
+    return next(folder.glob(f"{package}_*.deb"))
 
 
 def _unpack(package: Path, root: Path) -> None:

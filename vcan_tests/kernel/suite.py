@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 
 from vcan_tests.kernel import running
 from vcan_tests.kernel.errors import MissingTool
+from vcan_tests.kernel.fetch import fetch_udev
 from vcan_tests.kernel.guest import NO_STATUS, TIMED_OUT, exchange_folder, run_in_guest
 from vcan_tests.kernel.processes import run_to_end
 from vcan_tests.kernel.tools import require_tools
@@ -68,6 +69,7 @@ def run_part(mark: str, timeout_s: float, pytest_options: list[str]) -> Part:
         return run_here(mark, timeout_s, pytest_options)
     if mark == "systemd":
         build_package()
+        fetch_udev()
     print(f"booting the user-mode kernel for the {mark} tests", flush=True)
     command = pytest_command(mark, Path("/run/guest"), pytest_options)
     with exchange_folder() as exchange:
