@@ -44,3 +44,5 @@ class SensorDefects(Part, frozen=True, kw_only=True):
     """Amplitude of an error that goes through one wave in half a turn, as of a magnet off its centre."""
     hysteresis_deg: NotNegative = 0.0
     """Play between the axis and the sensor."""
+    noise_deg: NotNegative = 0.0
+    """Standard deviation of one reading."""

@@ -10,6 +10,7 @@ from canhelm.errors import LimitExceeded
 from daemon.loops.articulated import ArticulatedVehicle, Hitch
 from daemon.loops.measurement import Measurement
 from daemon.loops.odometry import Pose
+from daemon.loops.path import wrap
 from daemon.loops.path_driving import VehicleReading
 from daemon.loops.path_following import FollowingTuning
 from daemon.loops.path_speed import SpeedTuning
@@ -80,10 +81,17 @@ class SemitrailerVehicle(SteeredVehicle):
         self.reading = VehicleReading(truck, (bending,), steering, measurement.wheel_speed_m_s[0])
         return measurement
 
-    def locate(self, truck: Pose) -> None:
-        """Go on from where the driven axle's middle really is."""
-        self.odometry.pose = truck
-        self.reading = replace(self.reading, truck=truck)
+    def locate(self, truck: Pose, weight: float = 1.0) -> None:
+        """Go on from where somebody else says that the driven axle's middle is.
+
+        Args:
+            truck: its pose.
+            weight: of that against the odometry's: 1 believes it, 0 does not.
+        """
+        own = self.odometry.pose
+        x, y = own.x_m + weight * (truck.x_m - own.x_m), own.y_m + weight * (truck.y_m - own.y_m)
+        self.odometry.pose = Pose(x, y, own.yaw_rad + weight * wrap(truck.yaw_rad - own.yaw_rad))
+        self.reading = replace(self.reading, truck=self.odometry.pose)
 
     # --- motions -----------------------------------------------------------------------------------------------
 

@@ -73,7 +73,7 @@ class SimulatedEncoder(SimulatedNode):
         pair: name by which the world knows the wheel pair.
         world: the physics.
         boot_delay_s: time from power-up to the boot-up message.
-        defects: of its sensor.
+        sensor: what it reads its axis by; None: one without fault.
 
     Attributes:
         sensor: between the wheel pair and the counts.
@@ -87,7 +87,7 @@ class SimulatedEncoder(SimulatedNode):
         pair: str,
         world: World,
         boot_delay_s: float,
-        defects: SensorDefects | None = None,
+        sensor: SimulatedAngleSensor | None = None,
     ) -> None:
         turns = max(1, (config.total_counts or config.counts_per_turn) // config.counts_per_turn)
         factory: dict[str, Value] = {
@@ -105,7 +105,7 @@ class SimulatedEncoder(SimulatedNode):
         self._config = config
         self._pair = pair
         self._world = world
-        self.sensor = SimulatedAngleSensor(defects or SensorDefects())
+        self.sensor = sensor or SimulatedAngleSensor(SensorDefects())
         self._alarms = 0
         identity = (*_FACTORY_IDENTITY, _FIRST_SERIAL + config.node)
         self.lss = LssSlave(identity, config.node, self._lss_ended)

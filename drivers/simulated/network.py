@@ -7,6 +7,7 @@ from functools import partial
 from random import Random
 
 from drivers.simulated.ackermann import AckermannWorld
+from drivers.simulated.angle_sensor import SimulatedAngleSensor
 from drivers.simulated.body import BodyWorld
 from drivers.simulated.brake import SimulatedBrake
 from drivers.simulated.bus import SimulatedBus
@@ -20,6 +21,7 @@ from drivers.simulated.semitrailer import SemitrailerWorld
 from drivers.simulated.stand import StandWorld
 from profiles.bricks import DifferentialGeometry
 from profiles.schema import BrakeConfig, OmniGeometry, Profile
+from profiles.sensors import SensorDefects
 from profiles.steered import CarGeometry, SemitrailerGeometry
 
 _BOOT_DELAY_S = (0.05, 0.15)
@@ -80,7 +82,12 @@ class SimulatedNetwork:
         defects = profile.simulation.sensors if profile.simulation else {}
         self.encoders = {
             name: SimulatedEncoder(
-                medium.port(name), config, name, self.world, random.uniform(*_BOOT_DELAY_S), defects.get(name)
+                medium.port(name),
+                config,
+                name,
+                self.world,
+                random.uniform(*_BOOT_DELAY_S),
+                SimulatedAngleSensor(defects.get(name, SensorDefects()), f"{seed} {name}"),
             )
             for name, config in profile.encoders.items()
         }

@@ -54,7 +54,7 @@ async def test_parking_ends_within_three_centimetres_and_two_degrees(
         assert math.hypot(x - x_m, y - y_m) < 0.03
         assert math.degrees(yaw) == pytest.approx(heading_deg, abs=2.0)
         assert math.degrees(world_of(robot).bending_rad) == pytest.approx(0.0, abs=2.0)
-        assert result["end_error_m"] < 0.002
+        assert result["end_error_m"] < 0.005
         assert robot.state == "idle"
 
 
@@ -63,7 +63,7 @@ async def test_a_circle_backwards_is_driven_by_both_laws() -> None:
         async with running_robot(PROFILE) as robot:
             path = pieces({"arc_deg": 120, "radius_m": 1})
             result = await robot.call("drive.path", path=path, backward=True, law=law)
-            assert result["end_error_m"] < 0.002
+            assert result["end_error_m"] < 0.005
             assert math.degrees(world_of(robot).trailer_pose[2]) == pytest.approx(120.0, abs=1.5)
 
 
