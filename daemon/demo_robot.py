@@ -47,9 +47,9 @@ class DemoRobot:
         assert self.app.network is not None
         return self.app.network.world
 
-    async def boot(self, what: str) -> None:
+    async def boot(self, what: str, where: str = "on a simulated CANopen bus") -> None:
         """Wait until the vehicle is idle; the bus runs already. Raises Timeout."""
-        self.tell(f"booting: {what} on a simulated CANopen bus")
+        self.tell(f"booting: {what} {where}")
         loop = asyncio.get_running_loop()
         begin_s, ready = loop.time(), loop.create_future()
 

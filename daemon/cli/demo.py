@@ -12,14 +12,17 @@ from cyclopts import Parameter
 
 from canhelm.errors import UsageError
 from daemon.cli.demo_view import DemoView
-from daemon.cli.output import Json, say, show
+from daemon.cli.output import Json, say, show, words
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from daemon.demo import FigureResult
+    from daemon.demo_nxt import NxtResult
     from daemon.demo_turtle import TurtleFigure, TurtleResult
     from profiles.schema import Profile
+
+NXT = "nxt"
 
 
 def demo(
@@ -32,13 +35,13 @@ def demo(
     bus: str = "simulated",
     json: Json = None,
 ) -> int:
-    """Boot a simulated robot and drive the manoeuvres that its designers published: the MAX2D's, or the Turtle's.
+    """Boot a simulated robot and drive the manoeuvres that its designers published.
 
     Example: `canhelm demo --virtual-time --out demo-out`
 
     Args:
         figure: One figure of the MAX2D (4.6, 4.7, 4.15 or 4.16), all of them without it; one of the Turtle (7.3, 7.4,
-            7.6, 7.7, ice-off, ice-on), or `turtle` for all of those.
+            7.6, 7.7, ice-off, ice-on), or `turtle` for all of those; `nxt` for the NXT robot's.
         virtual_time: As fast as the processor goes instead of in real time; the same run every time.
         seed: Seed of everything random in the simulated network.
         out: Folder for pictures and the candump log.
@@ -50,11 +53,13 @@ def demo(
     from daemon.runtime.clock import run_precise, run_virtual
     from profiles.loader import load
 
+    if figure == NXT:
+        return _nxt(load(profile or NXT).profile, seed, out, json, run_virtual if virtual_time else run_precise)
     figures = tuple(entry for entry in FIGURES if figure in (None, entry.identity))
     turtle = tuple(entry for entry in demo_turtle.FIGURES if figure in (demo_turtle.GROUP, entry.identity))
     if not figures and not turtle:
         have = ", ".join(entry.identity for entry in (*FIGURES, *demo_turtle.FIGURES))
-        raise UsageError(f"no figure {figure!r}", remedy=f"one of {have}, {demo_turtle.GROUP}")
+        raise UsageError(f"no figure {figure!r}", remedy=f"one of {have}, {demo_turtle.GROUP}, {NXT}")
     robot = load(profile or ("turtle" if turtle else "max2d")).profile
     if turtle and bus != "simulated":
         raise UsageError("the accelerometer needs CAN", value=bus, remedy="leave --bus out")
@@ -113,6 +118,48 @@ def _turtle_table(results: list[TurtleResult]) -> Table:
             cells = [published.get(key), commanded.get(key), value]
             shown = ["-" if cell is None else f"{cell:g}" for cell in cells]
             table.add_row(result.figure.identity, result.figure.words, key, *shown)
+        table.add_section()
+    return table
+
+
+def _nxt(
+    robot: Profile,
+    seed: int,
+    out: Path | None,
+    json: bool | None,
+    runner: Callable[[Coroutine[Any, Any, list[NxtResult]]], list[NxtResult]],
+) -> int:
+    from daemon import demo_nxt
+
+    if out is not None:
+        _make_folder(out)
+    _end_by_signals()
+
+    async def drive() -> list[NxtResult]:
+        return [await demo_nxt.drive(robot, figure, seed, say) for figure in demo_nxt.FIGURES]
+
+    results, calls = runner(drive()), demo_nxt.report_calls()
+    show([*(result.numbers for result in results), *(call.numbers for call in calls)], _nxt_table, json)
+    if out is not None and _can_draw():
+        from daemon.demo_nxt_pictures import draw_calls, draw_moves
+
+        for path in (draw_moves(results, out), *draw_calls(calls, out)):
+            say(f"picture {path}")
+    return 0
+
+
+def _nxt_table(rows: list[dict[str, Any]]) -> Table:
+    from rich.table import Table
+
+    table = Table("figure", "quantity", "published", "open loop", "feedback", title="NXT, simulated")
+    for row in rows:
+        published, ways = row["published"], [row.get(way, {}) for way in ("open_loop", "feedback")]
+        if "reached" in row:
+            told = [words(published["reached"]), "-", f"{words(row['reached'])} ({row['duration_s']:g} s)"]
+            table.add_row(row["figure"], "reached", *told)
+            continue
+        for key in ("error_cm", "heading_error_deg", "tacho_error_deg", "duration_s"):
+            table.add_row(row["figure"], key, *(words(part.get(key)) for part in (published, *ways)))
         table.add_section()
     return table
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Any, Final
 
 import pytest
 
 from daemon.loops.differential import DifferentialDrive, bend, line, share_power, wrap_angle
 from daemon.loops.odometry import Pose
-from daemon.loops.pose_feedback import PoseGains, Tolerance, at_goal, polar_law
+from daemon.loops.pose_feedback import PoseGains, Tolerance
+from daemon.loops.published_pose_drive import IdealDrive, ideal_drive
 
 Case = dict[str, Any]
 
@@ -64,34 +64,10 @@ def check_line_bend(case: Case) -> None:
     assert as_tuple(end) == exact(tuple(expected["end_pose"]), 1e-6)
 
 
-@dataclass
-class Drive:
-    """The report's program, repaired: Euler with the old heading, then the test of the goal, then new speeds."""
-
-    track: list[Pose] = field(default_factory=list)
-    reached: bool = False
-    way: float = 0.0
-    fastest: float = 0.0
-
-
-def drive_to(given: Case) -> Drive:
-    drive, dt, done = DifferentialDrive(given["r"], given["l"]), given["dt"], Drive()
-    goal, tolerance = Pose(*given["goal"]), Tolerance(*given["var"])
+def drive_to(given: Case) -> IdealDrive:
     gains = PoseGains(given["k_rho"], given["k_alpha"], given["k_beta"])
-    pose, wheels = Pose(), (0.0, 0.0)
-    while len(done.track) * dt < given["Tmax"]:
-        forward, yaw_rate = drive.body_motion(*wheels)
-        x = pose.x_m + forward * math.cos(pose.yaw_rad) * dt
-        y = pose.y_m + forward * math.sin(pose.yaw_rad) * dt
-        pose = Pose(x, y, pose.yaw_rad + yaw_rate * dt)
-        done.track.append(pose)
-        done.way += abs(forward) * dt
-        done.reached = at_goal(pose, goal, tolerance)
-        if done.reached:
-            break
-        wheels = drive.wheel_speeds(*polar_law(pose, goal, gains))
-        done.fastest = max(done.fastest, *map(abs, wheels))
-    return done
+    drive, goal, tolerance = DifferentialDrive(given["r"], given["l"]), Pose(*given["goal"]), Tolerance(*given["var"])
+    return ideal_drive(drive, goal, tolerance, gains, given["dt"], given["Tmax"])
 
 
 def check_rho_alpha_beta(case: Case) -> None:
