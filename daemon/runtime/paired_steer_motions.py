@@ -1,0 +1,117 @@
+"""Motions of a robot with paired steering, from their begin to rest."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from typing import Any
+
+from canhelm.errors import DeviceFault
+from daemon.loops.measurement import Command, Measurement
+from daemon.loops.paired_steer import PairedSteerLaw, PairedSteerRecord
+from daemon.loops.paired_steer_target import PairedSteerTarget
+from daemon.runtime.motions import Motion
+
+STREAM_END_S = 2.0
+"""A stream whose last value has been too old for this long, with the robot at rest, is over."""
+
+
+class PairedSteerMotion(Motion):
+    """One target of the law, from steering to rest.
+
+    Args:
+        law: a law of its own, at rest.
+        target: what to do; None: come to rest.
+    """
+
+    def __init__(
+        self,
+        kind: str,
+        drives: tuple[str, ...],
+        lease: str | None,
+        law: PairedSteerLaw,
+        target: PairedSteerTarget | None,
+    ) -> None:
+        super().__init__(kind, drives, lease)
+        self._law = law
+        self._target = target
+        self._record: PairedSteerRecord | None = None
+
+    def step(self, measurement: Measurement, dt_s: float) -> Command:
+        """One step of the law; without a target it brings the robot to rest and engages the brakes."""
+        if self.stop_reason:
+            self._target = None
+        command, record = self._law.step(measurement, self._target, dt_s)
+        if self._target is not None:
+            self._record = record
+        if record.failure:
+            self.fail(DeviceFault(f"{self.kind}: {record.failure}", remedy="`canhelm status` shows drives and brakes"))
+        elif record.done:
+            self.on_done(measurement.time_s)
+        return command
+
+    def on_done(self, now_s: float) -> None:
+        """The robot rests at the target, or after a stop."""
+        self.finish(self._result(now_s))
+
+    def _result(self, now_s: float) -> dict[str, Any]:
+        error = max((abs(value) for value in self._record.heading_error_rad), default=0.0) if self._record else 0.0
+        warnings = list(self._record.warnings) if self._record else []
+        return {
+            "steering_error_deg": round(math.degrees(error), 4),
+            "duration_s": round(now_s - self.begun_s, 3),
+            "warnings": warnings,
+        }
+
+    def progress(self) -> dict[str, Any]:
+        """Phase, headings still to turn, speed, way to go, curve and mismatch angles."""
+        record = self._record
+        if record is None:
+            return {"phase": "enabling"}
+        return {
+            "phase": record.phase.value,
+            "pair": record.pair,
+            "heading_error_deg": [round(math.degrees(error), 3) for error in record.heading_error_rad],
+            "speed_m_s": round(record.speed_m_s, 4),
+            "remaining_m": None if record.remaining_m is None else round(record.remaining_m, 4),
+            "icr_m": None if record.icr_m is None else [round(value, 4) for value in record.icr_m],
+            "mismatch_deg": [round(math.degrees(angle), 3) for angle in record.mismatch_rad],
+            "limits_active": list(record.limits_active),
+            "warnings": list(record.warnings),
+        }
+
+
+class StreamMotion(PairedSteerMotion):
+    """Driving by a stream of values (``drive.set``); the robot stops when the last one is too old."""
+
+    streaming = True
+
+    def __init__(
+        self, kind: str, drives: tuple[str, ...], lease: str | None, law: PairedSteerLaw, target: PairedSteerTarget,
+        valid_for_s: float,
+    ) -> None:  # fmt: skip
+        super().__init__(kind, drives, lease, law, target)
+        self._wanted = target
+        self._valid_for_s = valid_for_s
+        self._taken_s = asyncio.get_running_loop().time()
+        self._age_s = 0.0
+
+    def take(self, target: PairedSteerTarget, valid_for_s: float) -> None:
+        """A new value."""
+        self._wanted = self._wanted if target == self._wanted else target
+        self._valid_for_s = valid_for_s
+        self._taken_s = asyncio.get_running_loop().time()
+
+    def step(self, measurement: Measurement, dt_s: float) -> Command:
+        """Follow the newest value, or come to rest where it is too old."""
+        self._age_s = measurement.time_s - self._taken_s
+        self._target = self._wanted if self._age_s <= self._valid_for_s else None
+        if not self.stop_reason and self._target is None and self._age_s > self._valid_for_s + STREAM_END_S:
+            self.stop("no new value came")
+        if self.stop_reason or self._target is not None:
+            return super().step(measurement, dt_s)
+        return self._law.step(measurement, None, dt_s)[0]
+
+    def progress(self) -> dict[str, Any]:
+        """As of any motion, and the age of the last value."""
+        return {**super().progress(), "value_age_ms": round(self._age_s * 1e3)}
