@@ -118,7 +118,8 @@ class App:
     async def start(self) -> None:
         """Open the sockets first, then the bus; everything else comes up by itself.
 
-        A bus that is missing or down is waited for; the control cycle ticks meanwhile.
+        A bus that is missing or down is waited for; the control cycle ticks meanwhile. Without any device it does not
+        tick, and nothing is sent.
 
         Raises:
             Refused, ConfigError, PermissionRefused: a socket or the log cannot be opened.
@@ -138,7 +139,8 @@ class App:
             self.devices.start()
         else:
             self._connecting = asyncio.create_task(self._wait_for_bus(), name="waiting for the bus")
-        self.cycle.start()
+        if self.devices.all:
+            self.cycle.start()
 
     async def _opens_bus(self) -> bool:
         try:

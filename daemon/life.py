@@ -104,6 +104,12 @@ class Life:
             if self._successor is None:
                 self._manager.ready()
 
+    def take_over(self, profile: Profile) -> App:
+        """Go on with another profile, at rest: the daemon that begins anew with it. Raises as its maker does."""
+        self._successor = self._make_app(profile)
+        self._turn.set()
+        return self._successor
+
     def _require_rest(self) -> None:
         state = self.app.supervisor.state
         if self._ending:

@@ -21,8 +21,10 @@ from drivers.bus.no_bus import NoBus
 from drivers.bus.socketcan import SocketCanBus
 from drivers.devices import Connect
 from drivers.encoder.objects import OBJECTS as ENCODER_OBJECTS
+from drivers.epos.first_look import FirstLook
 from drivers.epos.serial_bus import SerialGatewayBus
 from drivers.epos.serial_conversation import Transport
+from drivers.epos.serial_first_look import first_look_over
 from drivers.epos.serial_plan import facts, gateway_of, serial_profile
 from drivers.epos.serial_tty import BAUD_RATES, SerialTty, require_serial_device
 from drivers.simulated.bus import SimulatedBus
@@ -69,7 +71,7 @@ def make_wire(spec: str, profile: Profile, seed: int) -> Wire:
         spec: ``simulated``; ``rs232`` for a simulated drive on a simulated serial line; ``rs232:DEVICE[@BAUD]``;
             ``INTERFACE:CHANNEL`` of python-can; for a robot with nothing on CAN ``serial:DEVICE`` or ``usb`` for its
             brick, or ``none`` for all bricks as the profile says.
-        profile: the robot.
+        profile: the robot. Without any device a serial line is not opened: :func:`look_over_line` comes first.
         seed: of everything random in a simulated network.
 
     Raises:
@@ -105,7 +107,7 @@ def _bus_wire(spec: str, profile: Profile, seed: int) -> Wire:
     serial = _RS232.fullmatch(spec)
     if serial is None:
         return _can_wire(open_bus(spec, profile.network.bit_rate), profile)
-    if not profile.drives:
+    if not profile.drives and profile.bricks:
         remedy = "give serial:/dev/rfcomm0, usb, or simulated"
         raise UsageError(
             f"robot {profile.name} has no EPOS that {spec} could be the line of", value=spec, remedy=remedy
@@ -117,6 +119,8 @@ def _bus_wire(spec: str, profile: Profile, seed: int) -> Wire:
         remedy = f"give rs232:/dev/ttyS0@{baud}, or rs232@{baud} for a simulated line"
         raise UsageError(f"{spec!r} names no serial device", value=spec, remedy=remedy)
     require_serial_device(serial["device"])
+    if not profile.drives:
+        return Wire(NoBus(profile.network.bit_rate), profile)
     return _serial_wire(serial["device"], partial(_open_device, serial["device"], baud), profile, baud)
 
 
@@ -171,6 +175,19 @@ def _serial_wire(
         partial(LinePace, bus, late / shrunk.network.cycle_hz),
         READING_SHARE * late,
     )
+
+
+async def look_over_line(spec: str) -> FirstLook:
+    """What the drive on a serial line says of itself. Raises BusOff, Timeout, Aborted or Refused."""
+    serial = _RS232.fullmatch(spec)
+    assert serial is not None
+    device, baud = serial["device"], _baud(spec, serial["baud"])
+    port = SerialTty(device, baud)
+    port.open()
+    try:
+        return await first_look_over(port, baud, device)
+    finally:
+        port.close()
 
 
 def _open_device(device: str, baud: int, on_lost: OnLost) -> Transport:

@@ -37,13 +37,15 @@ def run(
     gateway: Path | None = None,
     gateway_tcp: int | None = None,
     gateway_write: Annotated[bool, Parameter(negative=())] = False,
+    bit_rate: int | None = None,
 ) -> int:
     """Run a robot's daemon in the foreground until Ctrl-C or SIGTERM; then it stops the vehicle and goes down.
 
     Example: `canhelm run --simulate --profile max2d`
 
     Args:
-        profile: Name of a profile, or a YAML file.
+        profile: Name of a profile, or a YAML file. Without it the daemon listens to the bus, scans it, tells who is
+            there, and lets each EPOS 24/5 be jogged slowly as robot `bench`.
         bus: `socketcan:can0` or another INTERFACE:CHANNEL of python-can; `rs232:/dev/ttyS0@115200` for the serial line
             of one EPOS that forwards to the others; `simulated`, or `rs232` for a simulated serial line. For a robot
             with nothing on CAN: `serial:/dev/rfcomm0` or `usb` for its NXT brick, `none`: as the profile says.
@@ -56,6 +58,7 @@ def run(
         gateway: Where other CANopen tools connect (CiA 309-3); the default is beside the socket, as NAME.309.sock.
         gateway_tcp: Port on the loopback interface for such tools as well, to read only.
         gateway_write: Let them write objects and command network states through the gateway's socket, too.
+        bit_rate: Bit/s of a bus without a profile; the default is 1000000.
     """
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is not signal.SIG_IGN:
@@ -67,11 +70,9 @@ def run(
 
     chosen = _bus(bus, simulate=simulate)
     _refuse_senseless(chosen, unpowered=unpowered, record=record, virtual_time=virtual_time)
-    if profile is None:
-        raise UsageError(
-            "which robot?", remedy="give --profile NAME or FILE; `canhelm profile list` shows the shipped ones"
-        )
-    robot = load(profile).profile
+    robot = load(profile).profile if profile else _unknown(chosen, bit_rate)
+    if profile and bit_rate is not None:
+        raise UsageError("--bit-rate is for a bus without a profile", remedy="write network.bit_rate in the profile")
     for given in (socket, gateway):
         _require_folder(given)
     journal.log_to_stderr(os.environ)
@@ -93,20 +94,45 @@ def run(
     return 0
 
 
-async def _live(make_app: Callable[[Profile], App], source: str, robot: Profile) -> str:
+def _unknown(bus: str, bit_rate: int | None) -> Profile:
+    """The robot that a bus without a profile begins with. Raises UsageError."""
+    import msgspec
+
+    from daemon.first_contact import bench_profile
+    from drivers.epos.codes import CAN_BIT_RATES
+    from profiles.schema import Network
+
+    if simulates(bus):
+        remedy = "give --profile NAME or FILE; `canhelm profile list` shows the shipped ones"
+        raise UsageError("which robot?", remedy=remedy)
+    try:
+        network = msgspec.convert({"bit_rate": bit_rate or 1_000_000}, Network)
+    except msgspec.ValidationError:
+        remedy = f"give {', '.join(map(str, sorted(CAN_BIT_RATES.values())))}"
+        raise UsageError(f"{bit_rate} bit/s is no bit rate of an EPOS", value=bit_rate, remedy=remedy) from None
+    return bench_profile(network)
+
+
+async def _live(make_app: Callable[[Profile], App], source: str | None, robot: Profile) -> str:
     """The daemon's life; how it left the vehicle."""
+    from daemon.first_contact import FirstContact
     from daemon.life import Life
     from daemon.runtime.notify import ServiceManager
     from profiles.kept import runtime_folder
     from profiles.loader import load
 
     async def load_anew() -> Profile:
-        return (await asyncio.to_thread(load, source)).profile
+        return (await asyncio.to_thread(load, source)).profile if source else life.app.profile
 
     manager = ServiceManager.of(os.environ, os.getpid())
     life = Life(make_app, load_anew, manager, runtime_folder(os.environ))
     life.take_signals()
-    return await life.run(robot)
+    contact = FirstContact(life)
+    if source is None:
+        contact.start()
+    farewell = await life.run(robot)
+    await contact.close()
+    return farewell
 
 
 def _refuse_senseless(bus: str, *, unpowered: bool, record: str | None, virtual_time: bool) -> None:

@@ -76,6 +76,7 @@ def table(data: Mapping[str, Any]) -> RenderableType:
 
     nodes = data.get("nodes") or ()
     parts: list[RenderableType] = [_headline(data), _NodeTable(nodes), *_troubles(nodes)]
+    parts += [_found(row) for row in data.get("found") or ()]
     parts.append(_brakes(data.get("brakes") or ()))
     parts += [_section(f"brick {brick['name']}", brick) for brick in data.get("bricks") or ()]
     sections = {title: data.get(title) for title in ("vehicle", "motions", "cycle")}
@@ -148,6 +149,14 @@ def _trouble(node: Mapping[str, Any]) -> str:
     if isinstance(fault, Mapping):
         return f"{fault.get('message', '')} - {fault.get('remedy', '')}"
     return str(fault or "") or ("" if node.get("node_state") == "ready" else str(node.get("status")))
+
+
+def _found(row: Mapping[str, Any]) -> RenderableType:
+    """What a first look at a node without a profile has told."""
+    from rich.text import Text
+
+    told = "; ".join(str(row[key]) for key in ("device", "firmware", "state", "remark") if row.get(key))
+    return Text.assemble((f"node {row.get('node')}: ", "bold"), told)
 
 
 def _brakes(brakes: Sequence[Mapping[str, Any]]) -> RenderableType:

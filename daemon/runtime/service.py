@@ -28,11 +28,13 @@ class Service:
 
     Attributes:
         recorder: of every frame; None where nothing is recorded.
+        found: what a first look at a bus without a profile has found.
     """
 
     def __init__(self, robot: str, supervisor: Supervisor, commands: Commands, bus: Bus, cycle: Cycle) -> None:
         self.robot = robot
         self.recorder: CandumpRecorder | None = None
+        self.found: list[dict[str, Any]] = []
         self.call = commands.call
         self.open_lease = supervisor.open_lease
         self.renew_lease = supervisor.renew_lease
@@ -73,6 +75,7 @@ class Service:
             "bricks": [{"name": name, **brick.status()} for name, brick in supervisor.devices.bricks.items()],
             "brakes": [brake.status() for brake in supervisor.devices.brakes.values()],
             "vehicle": supervisor.vehicle.status(),
+            "found": self.found,
             "limits_active": list(supervisor.active_limits),
             "motions": [motion.summary() for motion in supervisor.motions.values()],
             "bus": self._bus_status(),

@@ -40,6 +40,7 @@ class Supervisor:
 
     Attributes:
         bus_missing: why the bus could not be opened yet; empty once it is.
+        remark: what is waited for where the profile has no device.
         stop, estop, fault, power_off, until_rest: those of :class:`daemon.runtime.stopping.Stopping`.
     """
 
@@ -56,6 +57,7 @@ class Supervisor:
         self.measurement: Measurement | None = None
         self.command = vehicle.zero
         self.bus_missing = ""
+        self.remark = ""
         self.observers: list[Callable[[], None]] = []
         self._stale_s = master.network.late_after_cycles * period_s
         self._numbers = itertools.count(1)
@@ -82,7 +84,7 @@ class Supervisor:
             return VehicleState.STOPPING
         if self.powered:
             return VehicleState.ACTIVE
-        states = {device.node_state for device in self.devices.all}
+        states = {device.node_state for device in self.devices.all} or {NodeState.ABSENT}
         if states <= {NodeState.READY}:
             return VehicleState.IDLE
         return VehicleState.BOOTING if states <= {NodeState.READY, NodeState.CONFIGURING} else VehicleState.WAITING
@@ -109,7 +111,7 @@ class Supervisor:
     def _waiting(self) -> list[str]:
         """What is told of each device that is not ready; motors of one brick have one sentence."""
         told = [device.status_sentence for device in self._not_ready() if device.status_sentence]
-        return list(dict.fromkeys(told))
+        return list(dict.fromkeys(told)) or ([self.remark] if self.remark else [])
 
     @property
     def anything_enabled(self) -> bool:

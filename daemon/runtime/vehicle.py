@@ -113,7 +113,8 @@ class Vehicle(ABC):
 
     def stopping_time_s(self) -> float:
         """Time that the slowest quick-stop ramp needs from the fastest speed."""
-        return max(self.wheel_limit_m_s(name) / drive.quick_stop_m_s2 for name, drive in self.profile.wheels.items())
+        wheels = self.profile.wheels.items()
+        return max((self.wheel_limit_m_s(name) / drive.quick_stop_m_s2 for name, drive in wheels), default=0.0)
 
     def status(self) -> dict[str, Any]:
         """The vehicle for ``status``."""
