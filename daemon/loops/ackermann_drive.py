@@ -14,7 +14,6 @@ from daemon.loops.ackermann import AckermannController, AckermannGeometry, wheel
 from daemon.loops.geometry import clamp
 from daemon.loops.measurement import Command, Measurement
 from daemon.loops.motion_profile import ARRIVED_M, ramp, speed_to_end
-from daemon.loops.odometry import MAX_STEP_M, Pose, moved_along_arc
 from daemon.loops.pid import PidGains
 from daemon.loops.steered_axle import SteeredAxleLaw
 from profiles.schema import Limits
@@ -199,36 +198,3 @@ class CarLaw:
 
 def _gains(gains: RegulatorGains, scale: float) -> PidGains:
     return PidGains(scale * gains.proportional, scale * gains.integral, scale * gains.derivative)
-
-
-class CarOdometry:
-    """Adds up what the rear wheels roll to the pose of their axle's middle, along the arc that the steering makes.
-
-    The difference of the rear wheels tells the same as long as none of them slips, which driven wheels do.
-
-    Args:
-        geometry: the car.
-
-    Attributes:
-        pose: of the rear axle's middle.
-        skipped: readings that were not used because they cannot be true.
-    """
-
-    def __init__(self, geometry: CarGeometry) -> None:
-        self._wheelbase_m = geometry.wheelbase_m
-        self._last: Measurement | None = None
-        self.pose = Pose()
-        self.skipped = 0
-
-    def update(self, measurement: Measurement) -> None:
-        """Take one cycle's wheel travel and steering angle; the first one only sets the start."""
-        last, self._last = self._last, measurement
-        if last is None:
-            return
-        way = [new - old for new, old in zip(measurement.wheel_travel_m, last.wheel_travel_m, strict=True)]
-        angle = (measurement.heading_rad[0] + last.heading_rad[0]) / 2
-        if not (abs(way[0]) <= MAX_STEP_M and abs(way[1]) <= MAX_STEP_M and abs(angle) < math.pi / 2):
-            self.skipped += 1
-            return
-        forward = (way[0] + way[1]) / 2
-        self.pose = moved_along_arc(self.pose, forward, 0.0, forward * math.tan(angle) / self._wheelbase_m)

@@ -7,8 +7,9 @@ import math
 from typing import Any, Protocol
 
 from canhelm.errors import DeviceFault
-from daemon.loops.ackermann_drive import CarLaw, CarOdometry, CarRecord, CarTarget
+from daemon.loops.ackermann_drive import CarLaw, CarRecord, CarTarget
 from daemon.loops.measurement import Command, Measurement
+from daemon.loops.truck_odometry import TruckOdometry
 from daemon.runtime.motions import Motion
 from daemon.runtime.rest import AT_REST_M_S
 
@@ -19,7 +20,7 @@ STREAM_END_S = 2.0
 class Senses(Protocol):
     """What the vehicle knows of its own motion."""
 
-    odometry: CarOdometry
+    odometry: TruckOdometry
 
 
 class CarMotion(Motion):

@@ -1,27 +1,48 @@
-"""The car with front-wheel steering (ENPM808X report): its motions on the law ``daemon.loops.ackermann_drive``."""
+"""The car with front-wheel steering (ENPM808X report): headings, arcs, streams, and paths."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Final
 
 from canhelm.errors import LimitExceeded, Refused, UsageError
-from daemon.loops.ackermann_drive import CarLaw, CarOdometry, CarTarget
+from daemon.loops.ackermann import wheel_speeds
+from daemon.loops.ackermann_drive import CarLaw, CarTarget, car_kinematics
+from daemon.loops.articulated import ArticulatedVehicle
 from daemon.loops.measurement import Measurement
+from daemon.loops.odometry import Pose
+from daemon.loops.path_driving import VehicleReading
+from daemon.loops.path_following import FollowingTuning
+from daemon.loops.path_speed import SpeedTuning
+from daemon.loops.truck_odometry import TruckOdometry
 from daemon.runtime.car_motions import CarMotion, CarStream
 from daemon.runtime.motions import Motion
+from daemon.runtime.path_building import build_path
+from daemon.runtime.path_commands import PathRequest
+from daemon.runtime.path_motions import FollowedPath, PathMotion
 from daemon.runtime.steered_vehicle import SteeredVehicle
 from drivers.contract import Drive, SteeringEncoder
 from profiles.schema import Profile
 from profiles.steered import CarGeometry
 
-_ROUNDING = 1e-9
+STEERING_SHARE: Final = 0.9
+"""Of the steering angle, what a path may need; the rest is left to the law."""
+NO_REVERSE: Final = "this car has no reverse gear: none of its wheels turns backwards"
+_ROUNDING: Final = 1e-9
 
 
 class CarVehicle(SteeredVehicle):
-    """A car; its drives are those of the rear wheels, left and right, and of the steering."""
+    """A car; its drives are those of the rear wheels, left and right, and of the steering.
 
-    methods = ("drive.heading", "drive.turn", "drive.set")
+    Attributes:
+        kinematics: those of a truck without a trailer, for paths.
+        axle: the front axle.
+        names: of its drives.
+        reading: newest one.
+        odometry: where the middle of the rear axle is.
+    """
+
+    methods = ("drive.heading", "drive.turn", "drive.set", "drive.path")
 
     def __init__(self, profile: Profile, wheels: tuple[Drive, ...], steering: Drive, encoder: SteeringEncoder) -> None:
         assert isinstance(profile.vehicle, CarGeometry)
@@ -30,10 +51,16 @@ class CarVehicle(SteeredVehicle):
         self._geometry = profile.vehicle
         self._limits = profile.limits
         self._wheel_radius_m = profile.drives[wheels[0].name].wheel_radius_m
+        self._car = car_kinematics(profile.vehicle, profile.limits, self._wheel_radius_m)
         self._period_s = 1.0 / profile.network.cycle_hz
-        self._names = tuple(drive.name for drive in self.drives)
+        self.names = tuple(drive.name for drive in self.drives)
         self._wheel_acceleration_m_s2 = acceleration
-        self.odometry = CarOdometry(profile.vehicle)
+        self.axle = profile.vehicle.steering
+        limit_rad = math.radians(self.axle.limit_deg)
+        self.kinematics = ArticulatedVehicle(profile.vehicle.wheelbase_m, (), limit_rad)
+        self._planned = ArticulatedVehicle(profile.vehicle.wheelbase_m, (), STEERING_SHARE * limit_rad)
+        self.odometry = TruckOdometry(profile.vehicle.wheelbase_m)
+        self.reading = VehicleReading(Pose(), (), 0.0, 0.0)
 
     # --- motions -----------------------------------------------------------------------------------------------
 
@@ -41,11 +68,11 @@ class CarVehicle(SteeredVehicle):
         """The motion of ``drive.heading``, ``drive.turn`` or ``drive.set``."""
         law = self._law()
         if method == "drive.set":
-            return CarStream(method, self._names, lease, self, law, self._direction(params), _valid_for_s(params))
+            return CarStream(method, self.names, lease, self, law, self._direction(params), _valid_for_s(params))
         if method == "drive.turn":
-            return CarMotion(method, self._names, lease, self, law, self._arc(params))
+            return CarMotion(method, self.names, lease, self, law, self._arc(params))
         target = CarTarget(self._speed(params), heading_rad=math.radians(params["heading_deg"]))
-        return CarMotion(method, self._names, lease, self, law, target, float(params["duration_s"]))
+        return CarMotion(method, self.names, lease, self, law, target, float(params["duration_s"]))
 
     def _law(self) -> CarLaw:
         return CarLaw(
@@ -74,11 +101,7 @@ class CarVehicle(SteeredVehicle):
         if not math.isfinite(speed):
             raise UsageError("the speed is not a finite number", remedy="give m/s")
         if speed < 0:
-            raise Refused(
-                "this car has no reverse gear: none of its wheels turns backwards",
-                value=speed,
-                remedy="give a positive speed, and turn round forwards",
-            )
+            raise Refused(NO_REVERSE, value=speed, remedy="give a positive speed, and turn round forwards")
         _at_most("speed", speed, self._limits.speed_m_s, "m/s", "speed_m_s")
         return speed
 
@@ -103,15 +126,41 @@ class CarVehicle(SteeredVehicle):
         _at_most("speed on this arc", speed, wheels, "m/s", "wheel_speed_m_s of the outer wheel allows")
         return CarTarget(speed, steering_rad=steering, distance_m=speed * float(params["duration_s"]))
 
+    # --- paths -------------------------------------------------------------------------------------------------
+
+    async def plan_path(self, request: PathRequest) -> FollowedPath:
+        """See :class:`daemon.runtime.path_commands.PathVehicle`; this car is refused what is driven backwards."""
+        _refuse_reverse(request)
+        speed = self._limits.speed_m_s if request.speed_m_s is None else self._speed({"speed_m_s": request.speed_m_s})
+        path = await build_path(
+            request.spec,
+            self.reading.truck,
+            forward_curvature=self._planned.stable_curvature,
+            backward_curvature=0.0,
+            run_out_m=FollowingTuning().look_ahead_m,
+        )
+        tuning = SpeedTuning(speed, self._limits.acceleration_m_s2, self._limits.lateral_acceleration_m_s2)
+        return FollowedPath(self, path, tuning, request.law == "published")
+
+    def wheel_speeds(self, speed_m_s: float, steering_rad: float) -> tuple[float, float]:
+        """Rim speeds of the left and the right rear wheel for a speed of their axle's middle."""
+        left, right = wheel_speeds(self._car, steering_rad, speed_m_s)
+        return max(0.0, left * self._wheel_radius_m), max(0.0, right * self._wheel_radius_m)
+
     # --- measuring ---------------------------------------------------------------------------------------------
 
-    def observe(self, measurement: Measurement) -> None:
-        """Odometry."""
-        self.odometry.update(measurement)
+    def measure(self, now_s: float) -> Measurement:
+        """The newest readings, and where the car is by them."""
+        measurement = self._readings(now_s)
+        (left, right, _), (steering,) = measurement.wheel_travel_m, measurement.heading_rad
+        pose = self.odometry.update((left + right) / 2, steering)
+        speed = (measurement.wheel_speed_m_s[0] + measurement.wheel_speed_m_s[1]) / 2
+        self.reading = VehicleReading(pose, (), steering, speed)
+        return measurement
 
     def require_free(self, motion: Motion) -> None:
-        """The law needs the steering angle."""
-        if isinstance(motion, CarMotion):
+        """The laws need the steering angle."""
+        if isinstance(motion, CarMotion | PathMotion):
             self.encoders[0].require_ready()
 
     def status(self) -> dict[str, Any]:
@@ -127,6 +176,16 @@ class CarVehicle(SteeredVehicle):
                 "yaw_deg": round(math.degrees(pose.yaw_rad), 3),
             },
         }
+
+
+def _refuse_reverse(request: PathRequest) -> None:
+    """Raise Refused, with the piece, where a path is driven backwards."""
+    remedy = "drive the path forwards: leave --backward and drive: backward out"
+    if request.backward:
+        raise Refused(NO_REVERSE, remedy=remedy)
+    for number, piece in enumerate(request.spec.pieces):
+        if piece.drive == "backward":
+            raise Refused(NO_REVERSE, object=f"pieces[{number}]", remedy=remedy)
 
 
 def _valid_for_s(params: dict[str, Any]) -> float:

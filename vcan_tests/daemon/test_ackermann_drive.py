@@ -1,4 +1,4 @@
-"""The car's law and odometry, numbers only."""
+"""The car's law, numbers only."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from daemon.loops.ackermann_drive import CarLaw, CarOdometry, CarTarget
+from daemon.loops.ackermann_drive import CarLaw, CarTarget
 from daemon.loops.measurement import Measurement
 from profiles.loader import load
 from profiles.steered import CarGeometry
@@ -77,24 +77,3 @@ def test_an_arc_is_as_long_as_asked_and_begins_when_steered(steering: float, spe
         if record.done:
             break
     assert driven == pytest.approx(way, abs=1e-6)
-
-
-@given(st.floats(-3, 3), st.floats(0.6, 1.5))
-def test_odometry_follows_the_ideal_car(heading: float, speed: float) -> None:
-    car, one, odometry = IdealCar(), law(), CarOdometry(GEOMETRY)
-    rolled = [0.0, 0.0]
-    for _ in range(800):
-        command, _ = one.step(car.measurement(), car.heading_rad, CarTarget(speed, heading_rad=heading), DT)
-        car.move(command.wheel_speed_m_s)
-        rolled = [way + rim * DT for way, rim in zip(rolled, car.speeds[:2], strict=True)]
-        odometry.update(Measurement(0.0, car.speeds, (*rolled, 0.0), (car.steering_rad,)))
-    assert odometry.pose.yaw_rad == pytest.approx(car.heading_rad, abs=0.02)
-    assert math.remainder(car.heading_rad - heading, math.tau) == pytest.approx(0.0, abs=0.1)
-
-
-def test_a_reading_that_cannot_be_true_is_not_used() -> None:
-    odometry = CarOdometry(GEOMETRY)
-    for way in (0.0, 5.0, 5.1):
-        odometry.update(Measurement(0.0, (0.0, 0.0, 0.0), (way, way, 0.0), (0.0,)))
-    assert odometry.skipped == 1
-    assert odometry.pose.x_m == pytest.approx(0.1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+from typing import Any
 
 import pytest
 
@@ -153,3 +154,52 @@ async def test_one_motor_can_be_turned_alone() -> None:
     async with running_robot(CAR) as robot:
         await robot.call("motor.velocity", node="steering", velocity_rpm=500.0, duration_s=0.5)
         assert math.degrees(world_of(robot).steering.angle_rad) == pytest.approx(15.0, abs=2.0)
+
+
+async def follow(robot: Robot, pieces: list[dict[str, Any]], **params: Any) -> dict[str, Any]:
+    asked = {"backward": False, "speed_m_s": 0.5, "law": "cascade", "kept": None, "dry_run": False, **params}
+    return await robot.call("drive.path", path={"pieces": pieces}, **asked)
+
+
+async def test_it_follows_a_path_to_its_end() -> None:
+    async with running_robot(CAR) as robot:
+        result = await follow(robot, [{"line_m": 1.0}, {"arc_deg": 90, "radius_m": 0.8}, {"line_m": 1.0}])
+        assert world_of(robot).rear_pose == pytest.approx((1.8, 1.8, math.pi / 2), abs=0.03)
+        assert result["end_error_m"] < 0.005
+        assert result["largest_error_m"] < 0.015
+        assert robot.state == "idle"
+
+
+async def test_on_an_eight_it_keeps_to_the_path() -> None:
+    async with running_robot(CAR) as robot:
+        path = [{"arc_deg": 180, "radius_m": 1.0}, {"arc_deg": -180, "radius_m": 1.0}]
+        result = await follow(robot, path, speed_m_s=0.8)
+        assert world_of(robot).rear_pose == pytest.approx((0.0, 4.0, 0.0), abs=0.08)
+        assert result["largest_error_m"] < 0.03
+
+
+async def test_beside_the_path_it_comes_back_to_it() -> None:
+    async with running_robot(CAR) as robot:
+        result = await follow(robot, [{"from_m": [0.0, 0.15], "line_to_m": [3.0, 0.15]}])
+        assert world_of(robot).rear_pose == pytest.approx((3.0, 0.15, 0.0), abs=0.02)
+        assert result["largest_error_m"] == pytest.approx(0.15, abs=0.01)
+
+
+async def test_a_path_with_a_narrower_bend_than_its_steering_allows_is_refused_with_the_piece() -> None:
+    async with running_robot(CAR) as robot:
+        with pytest.raises(LimitExceeded, match="radius") as refusal:
+            await follow(robot, [{"line_m": 1.0}, {"arc_deg": 90, "radius_m": 0.4}, {"line_m": 1.0}])
+        assert refusal.value.object == "pieces[1]"
+
+
+@pytest.mark.parametrize(
+    ("pieces", "backward", "place"),
+    [([{"line_m": 1.0}], True, None), ([{"line_m": 1.0}, {"drive": "backward", "line_m": 1.0}], False, "pieces[1]")],
+)
+async def test_a_path_that_goes_backwards_is_refused(
+    pieces: list[dict[str, Any]], backward: bool, place: str | None
+) -> None:
+    async with running_robot(CAR) as robot:
+        with pytest.raises(Refused, match="no reverse gear") as refusal:
+            await follow(robot, pieces, backward=backward)
+        assert refusal.value.object == place
