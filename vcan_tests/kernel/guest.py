@@ -11,6 +11,7 @@ import fcntl
 import os
 import shlex
 import shutil
+import socket
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -61,8 +62,8 @@ def run_in_guest(
     kernel = fetch_kernel()
     _furnish(exchange, kernel, "run_systemd.sh" if systemd else "run_plain.sh")
     _write_script(exchange / "command", command, environment or {})
-    with _own_cpu() as cpu:
-        ended = run_to_end(_command_line(kernel, exchange, cpu, show_kernel), timeout_s)
+    with _own_cpu() as cpu, _serial_cable() as ends:
+        ended = run_to_end(_command_line(kernel, exchange, cpu, ends, show_kernel), timeout_s, ends)
     release = exchange / "kernel"
     status = TIMED_OUT if ended is None else _status(exchange)
     return Outcome(status, release.read_text().strip() if release.exists() else "that did not start")
@@ -99,15 +100,24 @@ def _write_script(script: Path, command: Sequence[str], environment: Mapping[str
     script.chmod(0o755)
 
 
-def _command_line(kernel: Kernel, exchange: Path, cpu: int, show_kernel: bool) -> list[str]:
+def _command_line(kernel: Kernel, exchange: Path, cpu: int, cable: tuple[int, int], show_kernel: bool) -> list[str]:
     """The guest's process. On one CPU it is 3 to 5 times as fast as on two; it ends when this process dies."""
     start = ["setpriv", "--pdeathsig", "TERM", "taskset", "-c", str(cpu)]
     if kernel.preload:
         start += ["env", f"LD_PRELOAD={kernel.preload}"]
     root = ["rootfstype=hostfs", "rootflags=/", "rw", f"init={exchange}/init", "lsm=yama"]
     place = ["mem=2G", f"uml_dir={exchange}", "umid=uml"]
+    serial = [f"ssl{number}=fd:{end}" for number, end in enumerate(cable)]
     output = ["con=null", "con0=null,fd:1", *(["loglevel=7"] if show_kernel else ["quiet", "loglevel=0"])]
-    return [*start, str(kernel.program), *root, *place, *output, "systemd.unit=guest.target"]
+    return [*start, str(kernel.program), *root, *place, *serial, *output, "systemd.unit=guest.target"]
+
+
+@contextmanager
+def _serial_cable() -> Iterator[tuple[int, int]]:
+    """Both ends of what joins the guest's serial ports, ``/dev/ttyS0`` and ``/dev/ttyS1``."""
+    one, other = socket.socketpair()
+    with one, other:
+        yield one.fileno(), other.fileno()
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 
 
-def run_to_end(command: Sequence[str], timeout_s: float | None) -> int | None:
+def run_to_end(command: Sequence[str], timeout_s: float | None, descriptors: Sequence[int] = ()) -> int | None:
     """The exit status of a command, or None when its time was over; its output goes to ours.
 
     The command has a session of its own, which is killed in the end with all that is still in it. Its output is copied
@@ -18,6 +18,7 @@ def run_to_end(command: Sequence[str], timeout_s: float | None) -> int | None:
     Args:
         command: Program and arguments.
         timeout_s: Wall time until it is killed, in seconds.
+        descriptors: Open files that it gets beside.
     """
     with _ended_by_signals(), subprocess.Popen(["cat"], stdin=subprocess.PIPE, start_new_session=True) as output:
         process = subprocess.Popen(
@@ -26,6 +27,7 @@ def run_to_end(command: Sequence[str], timeout_s: float | None) -> int | None:
             stdout=output.stdin,
             stderr=output.stdin,
             start_new_session=True,
+            pass_fds=descriptors,
         )
         try:
             return process.wait(timeout_s)

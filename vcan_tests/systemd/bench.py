@@ -115,10 +115,10 @@ class Robot:
 
     # -- the network ----------------------------------------------------------------------------------------------
 
-    def simulate(self, *options: str) -> None:
+    def simulate(self, *options: str, bus: str = f"socketcan:{BUS}") -> None:
         """Switch the motor power on: the nodes begin to boot."""
         run = ("systemd-run", "--quiet", "--collect", f"--unit={SIMULATOR}", "--property=Nice=-10")
-        told(*run, "/usr/bin/canhelm", "simulate", "--profile", "max2d", "--bus", f"socketcan:{BUS}", *options)
+        told(*run, "/usr/bin/canhelm", "simulate", "--profile", "max2d", "--bus", bus, *options)
 
     def switch_off(self) -> None:
         """Take the motor power away."""
