@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from canhelm.errors import UsageError
+from daemon.cli.demo_semitrailer import demo_semitrailer
 from daemon.cli.demo_view import DemoView
 from daemon.cli.output import Json, say, show, words
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from profiles.schema import Profile
 
 NXT = "nxt"
+SEMITRAILER = ("semitrailer", "line-backwards", "circle-backwards", "park-parallel", "park-perpendicular")
 
 
 def demo(
@@ -41,7 +43,9 @@ def demo(
 
     Args:
         figure: One figure of the MAX2D (4.6, 4.7, 4.15 or 4.16), all of them without it; one of the Turtle (7.3, 7.4,
-            7.6, 7.7, ice-off, ice-on), or `turtle` for all of those; `nxt` for the NXT robot's.
+            7.6, 7.7, ice-off, ice-on), or `turtle` for all of those; `nxt` for the NXT robot's;
+            one of the semi-trailer (line-backwards, circle-backwards, park-parallel, park-perpendicular), or
+            `semitrailer` for all of those.
         virtual_time: As fast as the processor goes instead of in real time; the same run every time.
         seed: Seed of everything random in the simulated network.
         out: Folder for pictures and the candump log.
@@ -55,11 +59,19 @@ def demo(
 
     if figure == NXT:
         return _nxt(load(profile or NXT).profile, seed, out, json, run_virtual if virtual_time else run_precise)
+    if figure in SEMITRAILER:
+        if out is not None:
+            _make_folder(out)
+        _end_by_signals()
+        vehicle, runner = load(profile or "semitrailer").profile, run_virtual if virtual_time else run_precise
+        return demo_semitrailer(figure, vehicle, seed, out, json, runner, _can_draw)
     figures = tuple(entry for entry in FIGURES if figure in (None, entry.identity))
     turtle = tuple(entry for entry in demo_turtle.FIGURES if figure in (demo_turtle.GROUP, entry.identity))
     if not figures and not turtle:
         have = ", ".join(entry.identity for entry in (*FIGURES, *demo_turtle.FIGURES))
-        raise UsageError(f"no figure {figure!r}", remedy=f"one of {have}, {demo_turtle.GROUP}, {NXT}")
+        raise UsageError(
+            f"no figure {figure!r}", remedy=f"one of {have}, {demo_turtle.GROUP}, {NXT}, {', '.join(SEMITRAILER)}"
+        )
     robot = load(profile or ("turtle" if turtle else "max2d")).profile
     if turtle and bus != "simulated":
         raise UsageError("the accelerometer needs CAN", value=bus, remedy="leave --bus out")

@@ -137,17 +137,18 @@ class FollowedPath(PathPlan):
 
     Args:
         vehicle: that drives.
-        path: of its reference points, drivable.
+        path: of its reference points, drivable; an attribute, too.
         speed: limits of the speed.
         published: by the thesis' law instead of the cascade.
     """
 
     def __init__(self, vehicle: FollowingVehicle, path: Path, speed: SpeedTuning, published: bool) -> None:
-        self._vehicle, self._path, self._speed, self._published = vehicle, path, speed, published
+        self.path = path
+        self._vehicle, self._speed, self._published = vehicle, speed, published
 
     def summary(self) -> dict[str, Any]:
         """Size of the path, where it begins, and about how long it takes."""
-        path, first = self._path, self._path.pieces[0]
+        path, first = self.path, self.path.pieces[0]
         curvature = max(abs(piece.curvature) for piece in path.pieces)
         length = math.fsum(piece.length_m for piece in path.pieces)
         return {
@@ -167,10 +168,10 @@ class FollowedPath(PathPlan):
     def motion(self, lease: str | None) -> PathMotion:
         """The motion. Raises Refused where the vehicle is not at the path's beginning."""
         vehicle, reading = self._vehicle, self._vehicle.reading
-        reason = at_begin(vehicle.kinematics, self._path, reading.truck, reading.bending_rad)
+        reason = at_begin(vehicle.kinematics, self.path, reading.truck, reading.bending_rad)
         if reason:
             remedy = "drive there first, or leave start: out of the path file to begin where the vehicle is"
             raise Refused(f"{KIND}: {reason}", remedy=remedy)
         rate = math.radians(vehicle.axle.rate_deg_s)
-        driver = PathDriver(vehicle.kinematics, self._path, self._speed, rate, self._published)
-        return PathMotion(lease, vehicle, self._path, driver)
+        driver = PathDriver(vehicle.kinematics, self.path, self._speed, rate, self._published)
+        return PathMotion(lease, vehicle, self.path, driver)

@@ -43,6 +43,7 @@ class SemitrailerVehicle(SteeredVehicle):
         encoders: of the steering angle and of the bending angle.
 
     Attributes:
+        geometry: its part of the profile.
         kinematics: with the limits of steering and bending angle.
         axle: the front axle.
         names: of its drives.
@@ -56,7 +57,7 @@ class SemitrailerVehicle(SteeredVehicle):
         self, profile: Profile, drive: Drive, steering: Drive, encoders: tuple[SteeringEncoder, SteeringEncoder]
     ) -> None:
         assert isinstance(profile.vehicle, SemitrailerGeometry)
-        geometry = self._geometry = profile.vehicle
+        geometry = self.geometry = profile.vehicle
         acceleration = profile.drives[drive.name].acceleration_m_s2
         super().__init__(profile, geometry.steering, (drive,), steering, encoders, acceleration)
         hitches = (Hitch(geometry.hitch_offset_m, geometry.trailer.length_m),)
