@@ -88,6 +88,7 @@ def findings(data: dict[str, Any], complete: bool = True) -> Iterator[Finding]:
     yield from _needed(data)
     yield from _brakes(data)
     yield from _accelerometer(data)
+    yield from _traction(data)
     yield from _encoders(data)
     yield from _unused(data)
 
@@ -198,6 +199,17 @@ def _accelerometer(data: dict[str, Any]) -> Iterator[Finding]:
     elif part(drives, drive).get("analog_inputs") is not True:
         remedy = f"write analog_inputs: true at drives.{drive}"
         yield Finding(path, f"{drive} does not tell its analog inputs", remedy)
+
+
+def _traction(data: dict[str, Any]) -> Iterator[Finding]:
+    """Without an accelerometer slip is found by currents, which tell little of a cycle that a drive ramps in."""
+    drives = _defined(data, "drives")
+    if not part(data, "traction") or part(data, "accelerometer") or drives is None:
+        return
+    for name in _names(part(data, "vehicle"), "wheels"):
+        if name in drives and part(drives, name).get("mode") != "velocity":
+            remedy = f"write mode: velocity at drives.{name}, or an accelerometer:"
+            yield Finding(("traction",), f"the currents of {name} tell no slip while it ramps by itself", remedy)
 
 
 def _brakes(data: dict[str, Any]) -> Iterator[Finding]:

@@ -336,7 +336,7 @@ class SimulationConfig(Part, frozen=True, kw_only=True):
     accelerometer_noise_m_s2: NotNegative = 0.0
     """Standard deviation of one reading of the accelerometer."""
     floor: dict[Name, FloorPatch] = field(default_factory=dict)
-    """Patches of another friction than the tyre's, the last one on top; for omni-wheels."""
+    """Patches of another friction than the tyre's, the last one on top."""
     sensors: dict[Name, SensorDefects] = field(default_factory=dict)
     """By the names of their encoders; the others are without fault."""
 

@@ -8,7 +8,7 @@ drive with both brakes engaged. Every step waits until the brakes certainly are 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
@@ -29,6 +29,8 @@ from daemon.loops.locked_drive import LockedDrive
 from daemon.loops.measurement import Command, Measurement
 from daemon.loops.motion_profile import ARRIVED_M, ramp, speed_to_end
 from daemon.loops.paired_steer_target import PairedSteerTarget, check_target
+from daemon.loops.paired_traction import PairedTraction
+from daemon.loops.slip_observer import RimDrive
 from daemon.loops.steering import REST_SPEED_M_S, SETTLE_TIME_S, PairSteering, SteeringPhase
 from profiles.schema import Limits, PairedSteerGeometry
 
@@ -98,10 +100,18 @@ class PairedSteerLaw:
 
     Wheel speeds while driving are computed from the headings that the pairs were steered to, not from each cycle's
     reading: that is what the brakes hold, and the encoders' resolution does not get into the speeds.
+
+    Args:
+        geometry: the robot.
+        limits: of the vehicle.
+        rim_drives: of wheels 1 to 4, to hold wheels that slip; without them slip is not answered.
     """
 
-    def __init__(self, geometry: PairedSteerGeometry, limits: Limits) -> None:
+    def __init__(self, geometry: PairedSteerGeometry, limits: Limits, rim_drives: Sequence[RimDrive] = ()) -> None:
         self._geometry = geometry
+        self._rim_drives = rim_drives
+        self._traction: PairedTraction | None = None
+        self._slips = False
         self._limits = limits
         self._tolerance_rad = math.radians(limits.heading_tolerance_deg)
         self._steps: dict[Phase, Callable[[Measurement, float], PerWheel]] = {
@@ -147,9 +157,19 @@ class PairedSteerLaw:
         if target is not self._target:
             self._begin(target)
         self._in_phase_s += dt
-        wheels = self._steps[self._phase](measurement, dt)
+        wheels = self._gripping(self._steps[self._phase](measurement, dt), measurement, dt)
         released = self._pair if self._phase in (Phase.RELEASING_BRAKE, Phase.TURNING_PAIR) else None
         return Command(wheels, (released == REAR, released == FRONT)), self._record(measurement)
+
+    def _gripping(self, wheels: PerWheel, measurement: Measurement, dt: float) -> PerWheel:
+        """The wheel speeds, those of slipping wheels held back."""
+        self._slips = False
+        if self._traction is None or self._pair is not None:
+            return wheels
+        record = self._traction.step(wheels, measurement.wheel_speed_m_s, measurement.motor_current_a, dt)
+        self._slips = any(record.grip.limited)
+        first, second, third, fourth = record.grip.wheel_speeds_m_s
+        return (first, second, third, fourth)
 
     def _begin(self, target: PairedSteerTarget | None) -> None:
         self._target = target
@@ -252,7 +272,10 @@ class PairedSteerLaw:
         if pair is not None:
             return self._begin_turn(pair, measurement)
         if self._moves():
-            self._locked = LockedDrive(self._geometry, self._limits, self._locked_headings(measurement))
+            headings = self._locked_headings(measurement)
+            self._locked = LockedDrive(self._geometry, self._limits, headings)
+            if self._rim_drives:
+                self._traction = PairedTraction(self._geometry, self._rim_drives, headings)
             self._enter(Phase.DRIVING)
         else:
             self._finished = self._target is not None and self._target.distance_m is not None
@@ -357,8 +380,12 @@ class PairedSteerLaw:
             centre_radius_m=unit.centre_radius_m if unit else None,
             yaw_rate_rad_s=self._speed_m_s * unit.yaw_rate_rad_s if unit else 0.0,
             mismatch_rad=unit.mismatch_rad if unit else _STANDING,
-            limits_active=("acceleration",) if unit and self._ramping else (),
+            limits_active=self._limits_active() if unit else (),
             warnings=driving.warnings if driving else (),
             done=self._phase is Phase.RESTING and (self._target is None or self._finished),
             failure=self._failure,
         )
+
+    def _limits_active(self) -> tuple[str, ...]:
+        active = {"acceleration": self._ramping, "traction": self._slips}
+        return tuple(name for name, holds in active.items() if holds)

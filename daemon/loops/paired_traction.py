@@ -17,13 +17,13 @@ from typing import Final
 
 from daemon.loops.geometry import FRONT, REAR, TURN_SIGN, WHEELS_OF_PAIR, PerPair, solve_turning
 from daemon.loops.odometry import least_squares
-from daemon.loops.slip_observer import Body, Observed, RimDrive, Row, SlipObserver
+from daemon.loops.slip_observer import Body, Observed, RimDrive, Row, SlipObserver, rim_drive
 from daemon.loops.wheel_grip import WheelGrip, WheelGripRecord
-from profiles.schema import PairedSteerGeometry
+from profiles.schema import PairedSteerGeometry, Profile
 
 RESIDUAL_M_S: Final = 0.05
 """Residual of a wheel that is slip for certain; in a curve the wheels' own mismatch leaves less."""
-SCRUB_RAD: Final = math.radians(4.0)
+SCRUB_RAD: Final = math.radians(1.0)
 """Angle between the direction of a wheel and its motion beyond which currents are no sign of slip."""
 
 
@@ -92,6 +92,14 @@ class PairedTraction:
             speed - (row[0] * x + row[1] * y + row[2] * turn)
             for row, speed in zip(self._rows, wheel_speeds, strict=True)
         )
+
+
+def rim_drives(profile: Profile) -> tuple[RimDrive, ...]:
+    """The drives of wheels 1 to 4; none where the profile answers no slip."""
+    traction, vehicle = profile.traction, profile.vehicle
+    if traction is None or not isinstance(vehicle, PairedSteerGeometry):
+        return ()
+    return tuple(rim_drive(profile.drives[name], traction) for name in vehicle.wheels)
 
 
 def _rows(geometry: PairedSteerGeometry, heading_rad: PerPair) -> tuple[list[Row], list[Row]]:

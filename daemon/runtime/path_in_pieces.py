@@ -8,7 +8,6 @@ from typing import Any, Protocol
 from canhelm.errors import DeviceFault, Refused
 from daemon.loops.measurement import Command, Measurement
 from daemon.loops.odometry import Odometry
-from daemon.loops.paired_steer import PairedSteerLaw
 from daemon.loops.paired_steer_piece import DrivenPiece, aimed, target_of
 from daemon.loops.paired_steer_target import PairedSteerTarget
 from daemon.loops.path import Path

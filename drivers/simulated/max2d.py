@@ -19,6 +19,7 @@ from random import Random
 
 from canhelm.errors import ConfigError
 from drivers.simulated.body import GRAVITY_M_S2, BodyWorld
+from drivers.simulated.floor import Floor
 from drivers.simulated.motor import WheelDrive
 from drivers.simulated.tyre import DAMPING_S, Contact
 from drivers.simulated.wheel_pair import Pair, Wheel
@@ -74,6 +75,7 @@ class Max2dWorld(BodyWorld):
         }
         for name, brake in profile.brakes.items():
             self._braked[name].set_brake(engaged=brake.energise_to_release)
+        self._floor = Floor(simulation.tyre.friction, simulation.floor) if simulation.floor else None
         self._yaw_inertia = vehicle.yaw_inertia_kg_m2
         self._mean_load_n = load
         height = vehicle.centre_of_mass_height_m
@@ -91,6 +93,11 @@ class Max2dWorld(BodyWorld):
     def slip_angle_rad(self) -> tuple[float, ...]:
         """True slip angles of wheels 1 to 4, positive where the contact point drifts to the left of its heading."""
         return tuple(wheel.contact.slip_angle_rad for wheel in self.wheels.values())
+
+    @property
+    def slip_m_s(self) -> tuple[float, ...]:
+        """True rim speeds less rolling speeds of wheels 1 to 4."""
+        return tuple(wheel.contact.slip_m_s for wheel in self.wheels.values())
 
     @property
     def force_n(self) -> tuple[tuple[float, float], ...]:
@@ -114,6 +121,8 @@ class Max2dWorld(BodyWorld):
         """Integrate one step: forces by the old velocities, then velocities, then positions."""
         dt = self._step_s
         rear, front = self._rear, self._front
+        if self._floor is not None:
+            self._feel(self._floor)
         vx, vy = self._body_velocity()
         rear.roll(vx, vy, self._yaw_rate, dt)
         front.roll(vx, vy, self._yaw_rate, dt)
@@ -121,6 +130,13 @@ class Max2dWorld(BodyWorld):
         force_y = rear.force_y_n + front.force_y_n
         self._move(force_x, force_y, self._turn_pairs(dt), dt)
         self._shift_loads(force_x, force_y, dt)
+
+    def _feel(self, floor: Floor) -> None:
+        """Each wheel stands on the friction of its place and time."""
+        c, s, time_s = self._cos, self._sin, self.time_s
+        for pair in (self._rear, self._front):
+            for wheel, (x, y) in zip((pair.right, pair.left), pair.contact_points(), strict=True):
+                wheel.contact.stand_on(floor.friction(self._x_m + x * c - y * s, self._y_m + x * s + y * c, time_s))
 
     def _turn_pairs(self, dt: float) -> float:
         """Yaw acceleration of the body with the pairs that are held, and turning of the pairs that are not."""

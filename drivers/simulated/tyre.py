@@ -39,7 +39,6 @@ class Contact:
     __slots__ = (
         "_deflection_x",
         "_deflection_y",
-        "_friction",
         "_lateral_m_s",
         "_limit_m",
         "_rim_m_s",
@@ -53,9 +52,9 @@ class Contact:
 
     def __init__(self, tyre: Tyre) -> None:
         stiffness = tyre.cornering_stiffness_per_rad / tyre.relaxation_length_m
-        self._friction = tyre.friction
         self._stiffness = stiffness
-        self._limit_m = 3.0 * tyre.friction / stiffness
+        self._limit_m = 0.0
+        self.stand_on(tyre.friction)
         self._roll_out_x = stiffness / tyre.slip_stiffness
         self._roll_out_y = stiffness / tyre.cornering_stiffness_per_rad
         self._deflection_x = 0.0
@@ -64,11 +63,20 @@ class Contact:
         self.force_y_n = 0.0
         self._rim_m_s = self._roll_m_s = self._lateral_m_s = 0.0
 
+    def stand_on(self, friction: float) -> None:
+        """From now on the floor has this coefficient of friction."""
+        self._limit_m = 3.0 * friction / self._stiffness
+
     @property
     def slip_ratio(self) -> float:
         """(rim speed - rolling speed) over the faster of the two, in the last step."""
         reference = max(abs(self._rim_m_s), abs(self._roll_m_s), SLOWEST_REFERENCE_M_S)
         return (self._rim_m_s - self._roll_m_s) / reference
+
+    @property
+    def slip_m_s(self) -> float:
+        """Rim speed less rolling speed, in the last step."""
+        return self._rim_m_s - self._roll_m_s
 
     @property
     def slip_angle_rad(self) -> float:

@@ -116,6 +116,13 @@ class Pair:
         self._cos = cos(heading_rad)
         self._sin = sin(heading_rad)
 
+    def contact_points(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Where the right and the left wheel touch the floor, in the body's frame."""
+        c, s, lead, arm = self._cos, self._sin, self._lead_m, self._arm_m
+        x, y = self.offset_m + lead * c, lead * s
+        out_x, out_y = -arm * s, arm * c + self._half_track_m
+        return (x - out_x, y - out_y), (x + out_x, y + out_y)
+
     def roll(self, vx: float, vy: float, yaw_rate: float, dt_s: float) -> None:
         """Roll both wheels for one step: deform the tyres, turn the wheels, sum the forces on the body."""
         c, s = self._cos, self._sin

@@ -51,6 +51,7 @@ def test_the_turtles_wheels_roll_as_its_report_says() -> None:
         ("limits: {yaw_rate_deg_s: 300}", "limits.yaw_rate_deg_s: is 300 deg/s, what the wheels' limit leaves"),
         ("drives: {wheel_1: {acceleration_m_s2: 3.2}}", "drives.wheel_1.acceleration_m_s2: is 3.2 m/s^2, mass, tyre"),
         ("simulation: {tyre: {friction: 0.2}}", "drives.wheel_1.acceleration_m_s2: is 2.4 m/s^2, mass, tyre and"),
+        ("accelerometer: null", "traction: the currents of wheel_1 tell no slip while it ramps by itself; write mode:"),
         ("simulation: {floor: {ice: {friction: -1}}}", "simulation.floor.ice.friction: is -1; write a number from 0"),
     ],
 )
