@@ -8,6 +8,7 @@ from typing import Any
 
 from canhelm.errors import LimitExceeded, UsageError
 from daemon.loops.accelerometer import Mounting
+from daemon.loops.jerk_limit import JerkLimitedGuide
 from daemon.loops.measurement import Measurement
 from daemon.loops.omni_drive import OmniLaw
 from daemon.loops.omni_guide import GoalGuide, Guide, PublishedGuide, Signals, Twist, TwistGuide
@@ -130,10 +131,13 @@ class OmniVehicle(Vehicle):
         """
         self._check(goal, limits)
         guide: Guide
+        jerk, traction = self.profile.limits.jerk_m_s3, self._new_traction(limits.acceleration)
         if published:
             guide = PublishedGuide(goal, limits, self._period_s, signals, threshold_m_s2)
+        elif jerk is not None:
+            guide = JerkLimitedGuide(goal, limits, jerk, self._period_s, traction)
         else:
-            guide = GoalGuide(goal, limits, self._new_traction(limits.acceleration))
+            guide = GoalGuide(goal, limits, traction)
         return GoalMotion(kind, self._names, lease, self.senses, self._law(guide), goal)
 
     def _to(self, params: dict[str, Any], lease: str | None) -> Motion:

@@ -270,6 +270,24 @@ async def test_one_motor_turns_by_itself() -> None:
         assert robot.state == "idle"
 
 
+async def test_a_profiles_jerk_limit_is_kept_by_drive_to() -> None:
+    limits = msgspec.structs.replace(TURTLE.limits, jerk_m_s3=4.0)
+    async with running_robot(msgspec.structs.replace(TURTLE, limits=limits)) as robot:
+        accelerations = [0.0]
+
+        def look() -> None:
+            motions = [motion for motion in robot.app.supervisor.motions.values() if isinstance(motion, OmniMotion)]
+            records = [motion.record for motion in motions if motion.record]
+            accelerations.extend(record.guidance.acceleration_m_s2[0] for record in records)
+
+        robot.app.supervisor.observers.append(look)
+        result = await robot.call("drive.to", x_m=2.0, y_m=0.0)
+        changes = [abs(new - old) for new, old in zip(accelerations[1:], accelerations, strict=False)]
+        assert max(changes) <= 0.04 * (1 + 1e-6)
+        assert result["error_m"] < 0.003
+        assert result["least_safety_factor"] == 1.0
+
+
 def without_accelerometer() -> Profile:
     """The turtle with drives whose currents tell slip: without a ramp of their own in each cycle."""
     drives = {
