@@ -22,6 +22,7 @@ from daemon.wires import make_wire
 from drivers.canopen.master import Master
 from drivers.contract import Drive
 from drivers.devices import Devices
+from drivers.simulated.workshop import Workshop
 from profiles.schema import Profile
 
 if TYPE_CHECKING:
@@ -59,6 +60,8 @@ class App:
         seed: of everything random in the simulated network.
         powered: whether the simulated nodes have power from the start.
         gateway: where other CANopen tools are served; None for nowhere.
+        built: how the simulated robot is really built and wired; None: as its profile says.
+        profile_file: where the profile stands, for commands that change it; None for nowhere.
         inherited: sockets that listen already, by their paths; the service manager has opened them and takes them away.
     """
 
@@ -73,9 +76,11 @@ class App:
         powered: bool = True,
         gateway: GatewayAccess | None = None,
         inherited: Mapping[Path, Socket] | None = None,
+        built: Profile | None = None,
+        profile_file: Path | None = None,
     ) -> None:
         self.spec = bus
-        self.wire = wire = make_wire(bus, profile, seed)
+        self.wire = wire = make_wire(bus, profile, seed, built)
         self.profile = profile = wire.profile
         self.network = wire.network
         self.medium = wire.medium
@@ -94,8 +99,9 @@ class App:
         self.cycle = Cycle(
             self.master, self.devices, period_s, self.supervisor.step, wire.pace, wire.reading_share, late
         )
-        commands = Commands(self.supervisor, self.network)
-        self.service = Service(profile.name, self.supervisor, commands, self.bus, self.cycle)
+        workshop = Workshop(built or profile, self.network) if self.network else None
+        commands = Commands(self.supervisor, self.network, workshop)
+        self.service = Service(profile.name, self.supervisor, commands, self.bus, self.cycle, profile_file)
         self.server = self._serve(socket) if socket else None
         self.gateway = self._serve_tools(gateway) if gateway else None
 

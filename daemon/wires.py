@@ -64,7 +64,7 @@ class Wire:
     bricks: Mapping[str, Connect] = field(default_factory=dict)
 
 
-def make_wire(spec: str, profile: Profile, seed: int) -> Wire:
+def make_wire(spec: str, profile: Profile, seed: int, built: Profile | None = None) -> Wire:
     """The way to a robot that a SPEC names.
 
     Args:
@@ -73,13 +73,14 @@ def make_wire(spec: str, profile: Profile, seed: int) -> Wire:
             brick, or ``none`` for all bricks as the profile says.
         profile: the robot. Without any device a serial line is not opened: :func:`look_over_line` comes first.
         seed: of everything random in a simulated network.
+        built: how the robot of a simulated network is really built; None: as its profile says.
 
     Raises:
         UsageError: a SPEC that means nothing.
     """
     if spec == "none" or is_brick_port(spec):
         return _brick_wire(spec, profile)
-    wire = _bus_wire(spec, profile, seed)
+    wire = _bus_wire(spec, profile, seed, built or profile)
     if wire.network is not None:
         links = {name: twin.link.connect for name, twin in wire.network.bricks.items()}
         return replace(wire, bricks=links)
@@ -99,10 +100,10 @@ def _brick_wire(spec: str, profile: Profile) -> Wire:
     return Wire(NoBus(profile.network.bit_rate), profile, bricks=connects)
 
 
-def _bus_wire(spec: str, profile: Profile, seed: int) -> Wire:
+def _bus_wire(spec: str, profile: Profile, seed: int, built: Profile) -> Wire:
     if spec == "simulated":
         medium = SimulatedBus(bit_rate=profile.network.bit_rate, name="vcan0")
-        network = SimulatedNetwork(profile, medium, seed)
+        network = SimulatedNetwork(built, medium, seed)
         return Wire(medium.port("master"), profile, network, medium)
     serial = _RS232.fullmatch(spec)
     if serial is None:
@@ -114,7 +115,7 @@ def _bus_wire(spec: str, profile: Profile, seed: int) -> Wire:
         )
     baud = _baud(spec, serial["baud"])
     if serial["colon"] is None:
-        return _simulated_serial(profile, baud, seed)
+        return _simulated_serial(profile, baud, seed, built)
     if not serial["device"]:
         remedy = f"give rs232:/dev/ttyS0@{baud}, or rs232@{baud} for a simulated line"
         raise UsageError(f"{spec!r} names no serial device", value=spec, remedy=remedy)
@@ -142,9 +143,9 @@ def _can_wire(bus: Bus, profile: Profile) -> Wire:
     return Wire(bus, profile)
 
 
-def _simulated_serial(profile: Profile, baud: int, seed: int) -> Wire:
+def _simulated_serial(profile: Profile, baud: int, seed: int, built: Profile) -> Wire:
     medium = SimulatedBus(bit_rate=profile.network.bit_rate, name="vcan0")
-    network = SimulatedNetwork(profile, medium, seed)
+    network = SimulatedNetwork(built, medium, seed)
     port = SimulatedSerial(network.drives[gateway_of(profile)], baud, seed=seed)
     return _serial_wire("rs232", partial(_open_cable, port.cable), profile, baud, network, medium, port.cable)
 

@@ -90,6 +90,7 @@ def findings(data: dict[str, Any], complete: bool = True) -> Iterator[Finding]:
     yield from _accelerometer(data)
     yield from _traction(data)
     yield from _encoders(data)
+    yield from _factory(data)
     yield from _unused(data)
 
 
@@ -254,6 +255,13 @@ def _encoders(data: dict[str, Any]) -> Iterator[Finding]:
         if zero >= total:
             what = f"is {zero}, outside the range"
             yield Finding(("encoders", name, "zero_counts"), what, f"write 0 to {total - 1}")
+
+
+def _factory(data: dict[str, Any]) -> Iterator[Finding]:
+    given, drives = part(data, "simulation").get("factory"), _defined(data, "drives")
+    for index, name in enumerate(given if isinstance(given, list) else ()):
+        if drives is not None and name not in drives:
+            yield _unknown(("simulation", "factory", index), "drives", name, drives)
 
 
 def _unused(data: dict[str, Any]) -> Iterator[Finding]:

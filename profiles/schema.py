@@ -164,6 +164,8 @@ class EncoderConfig(Part, frozen=True, kw_only=True):
     """1: counts grow when the pair turns counter-clockwise."""
     zero_counts: Counts = 0
     """Position value at heading 0."""
+    zero_before_counts: Counts | None = None
+    """What the place that heading 0 has now said before the last `canhelm encoder zero`, to go back by."""
     calibration: AngleCalibration | None = None
     """What `canhelm calibrate` found; None: the counts are right."""
 
@@ -339,6 +341,8 @@ class SimulationConfig(Part, frozen=True, kw_only=True):
     """Patches of another friction than the tyre's, the last one on top."""
     sensors: dict[Name, SensorDefects] = field(default_factory=dict)
     """By the names of their encoders; the others are without fault."""
+    factory: tuple[Name, ...] = ()
+    """Drives that are as they left the factory: node id 1, nothing set up."""
 
 
 class Profile(Part, frozen=True, kw_only=True):
@@ -348,6 +352,8 @@ class Profile(Part, frozen=True, kw_only=True):
     name: Name
     """Name of the robot; its socket is called after it. Left out: the name of its file."""
     description: str = ""
+    setup: Literal["needed", "done", "waived"] = "waived"
+    """needed: the robot is not driven before `canhelm setup` was done, or this says waived."""
     network: Network = Network()
     drives: dict[Name, DriveConfig] = field(default_factory=dict)
     bricks: dict[Name, BrickConfig] = field(default_factory=dict)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +10,10 @@ import msgspec
 import yaml
 
 from canhelm.errors import ConfigError
-from profiles.loader import CALIBRATION
+from profiles.loader import CALIBRATION, load
 from profiles.sensors import AngleCalibration
 
-_HEAD = "# Written by `canhelm calibrate`; merged last into the profile beside it. A person's file stays as it is.\n"
+_HEAD = "# Written by canhelm; merged last into the profile beside it. A person's file stays as it is.\n"
 
 
 def write_calibration(profile: Path, encoder: str, calibration: AngleCalibration) -> Path:
@@ -29,21 +30,58 @@ def write_calibration(profile: Path, encoder: str, calibration: AngleCalibration
     Raises:
         ConfigError: the side file cannot be read or written.
     """
+    return write_values(profile, {("encoders", encoder, "calibration"): _plain(calibration)})
+
+
+def write_values(profile: Path, values: Mapping[tuple[str, ...], Any]) -> Path:
+    """Put values into the side file of a profile; what else stands there stays.
+
+    Args:
+        profile: the robot's own file.
+        values: by their keys from the root, as ``("drives", "rear_left", "direction")``.
+
+    Returns:
+        The side file.
+
+    Raises:
+        ConfigError: the side file cannot be read or written, or the profile has mistakes with it; then it stays as it
+            was.
+    """
     side = profile.with_name(profile.stem + CALIBRATION)
     try:
-        values = yaml.safe_load(side.read_text(encoding="utf-8")) if side.is_file() else None
-        if not isinstance(values, dict | None):
+        before = side.read_text(encoding="utf-8") if side.is_file() else None
+        merged = yaml.safe_load(before) if before is not None else {}
+        if not isinstance(merged, dict | None):
             raise ConfigError(f"{side} is not a mapping", remedy="mend or remove it")
-        merged = _with(values or {}, ("encoders", encoder, "calibration"), _plain(calibration))
-        new = side.with_name(f"{side.name}.new")
-        new.write_text(_HEAD + yaml.safe_dump(merged, sort_keys=False), encoding="utf-8")
-        new.replace(side)
+        for keys, value in values.items():
+            merged = _with(merged or {}, keys, value)
+        _replace(side, _HEAD + yaml.safe_dump(merged, sort_keys=False))
+        _require_sound(profile, side, before)
     except OSError as error:
-        remedy = "calibrate a profile of your own: `canhelm profile new` makes one"
+        remedy = "use a profile of your own: `canhelm profile new` makes one"
         raise ConfigError(f"cannot write {side}: {error.strerror}", value=str(side), remedy=remedy) from None
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise ConfigError(f"cannot read {side}: {error}", value=str(side), remedy="mend or remove it") from None
     return side
+
+
+def _replace(side: Path, text: str) -> None:
+    """All of it or nothing. Raises OSError."""
+    new = side.with_name(f"{side.name}.new")
+    new.write_text(text, encoding="utf-8")
+    new.replace(side)
+
+
+def _require_sound(profile: Path, side: Path, before: str | None) -> None:
+    """Raise ConfigError where the profile has mistakes now, and put the side file back as it was."""
+    try:
+        load(profile)
+    except ConfigError:
+        if before is None:
+            side.unlink()
+        else:
+            _replace(side, before)
+        raise
 
 
 def _plain(calibration: AngleCalibration) -> dict[str, Any]:

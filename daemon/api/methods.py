@@ -7,6 +7,7 @@ from typing import Any
 
 from daemon.api.nxt_methods import NXT_METHODS
 from daemon.api.parameters import REQUIRED, Method, Param, Role
+from daemon.api.simulation_methods import SIMULATION_METHODS
 
 _NODE = Param("node", "node", "node id, or name from the profile")
 _WAIT = Param("wait", "boolean", "answer when the motion is done; false hands it to the daemon", default=True)
@@ -271,28 +272,6 @@ _NETWORK = (
     ),
     Method("motion.wait", "Answer when a motion is done.", (_MOTION,), "motion", Role.WATCH),
     Method("motion.stop", "Stop one motion by its ramp; answers at rest.", (_MOTION,), "motion, state"),
-    Method(
-        "simulation.power",
-        "Switch the supply of a simulated node.",
-        (Param("node", "node", "node id, name, or all"), Param("on", "boolean", "on or off")),
-        "node, on",
-    ),
-    Method(
-        "simulation.input",
-        "Apply a level to a digital input of a simulated drive.",
-        (
-            _NODE,
-            Param("input", "integer", "number of the digital input", minimum=1, maximum=6),
-            Param("level", "string", "what is applied", choices=("low", "high")),
-        ),
-        "node, input, level",
-    ),
-    Method(
-        "simulation.turn",
-        "Hold the axis of a simulated encoder by hand, as for a calibration.",
-        (_NODE, replace(_angle("angle_deg", "where it is held; let go where left out"), default=None)),
-        "node, angle_deg",
-    ),
 )
 
 _CONFIRM = Param("confirm", "boolean", "must be true: somebody has agreed", default=False)
@@ -385,7 +364,8 @@ _CONFIG = (
 )
 
 METHODS: dict[str, Method] = {
-    method.name: method for method in (*_TALK, *_WHOLE, *_MOTOR, *_VEHICLE, *_NETWORK, *_NODES, *_CONFIG, *NXT_METHODS)
+    method.name: method
+    for method in (*_TALK, *_WHOLE, *_MOTOR, *_VEHICLE, *_NETWORK, *_NODES, *_CONFIG, *NXT_METHODS, *SIMULATION_METHODS)
 }
 
 NOTIFICATIONS = {

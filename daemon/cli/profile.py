@@ -32,6 +32,7 @@ _NEW = """\
 schema_version: {version}
 name: {name}
 extends: {base}
+setup: needed   # `canhelm setup` looks at every wheel, encoder and brake first; `waived` drives without
 
 # drives:
 #   rear_right: {{node: 11, wheel_radius_m: 0.105}}
@@ -146,7 +147,7 @@ def new(name: str, /, *, extends: str = "max2d", out: Path | None = None) -> Non
         raise Refused(
             f"{out} cannot be written: {error.strerror}", value=str(out), remedy="choose another --out"
         ) from error
-    say(f"{out} is written; check it with: canhelm profile check {out}")
+    say(f"{out} is written; run it with `canhelm run --profile {out} --bus ...`, then `canhelm setup`")
 
 
 def _summary(path: Path) -> dict[str, Any]:

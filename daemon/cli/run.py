@@ -38,6 +38,7 @@ def run(
     gateway_tcp: int | None = None,
     gateway_write: Annotated[bool, Parameter(negative=())] = False,
     bit_rate: int | None = None,
+    miswire: str | None = None,
 ) -> int:
     """Run a robot's daemon in the foreground until Ctrl-C or SIGTERM; then it stops the vehicle and goes down.
 
@@ -59,6 +60,7 @@ def run(
         gateway_tcp: Port on the loopback interface for such tools as well, to read only.
         gateway_write: Let them write objects and command network states through the gateway's socket, too.
         bit_rate: Bit/s of a bus without a profile; the default is 1000000.
+        miswire: Profile of how the simulated robot is really built and wired, to find it out by `canhelm setup`.
     """
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is not signal.SIG_IGN:
@@ -70,7 +72,10 @@ def run(
 
     chosen = _bus(bus, simulate=simulate)
     _refuse_senseless(chosen, unpowered=unpowered, record=record, virtual_time=virtual_time)
-    robot = load(profile).profile if profile else _unknown(chosen, bit_rate)
+    loaded = load(profile) if profile else None
+    robot = loaded.profile if loaded else _unknown(chosen, bit_rate)
+    if miswire and not simulates(chosen):
+        raise UsageError(f"--miswire is for simulated robots, and {chosen} is real", remedy="leave it out")
     if profile and bit_rate is not None:
         raise UsageError("--bit-rate is for a bus without a profile", remedy="write network.bit_rate in the profile")
     for given in (socket, gateway):
@@ -88,6 +93,8 @@ def run(
         powered=not unpowered,
         gateway=GatewayAccess(gateway or path.with_suffix(protocol.GATEWAY_SUFFIX), gateway_tcp, gateway_write),
         inherited=inherited,
+        built=load(miswire).profile if miswire else None,
+        profile_file=loaded.path.resolve() if loaded else None,
     )
     runner: Callable[[Coroutine[Any, Any, str]], str] = run_precise if simulates(chosen) else asyncio.run
     say(runner(_live(make_app, profile, robot)))

@@ -37,6 +37,40 @@ def turn(node: Node, angle: float | None = None, /, *, options: Options = DEFAUL
         show(client.call("simulation.turn", node=wanted, angle_deg=angle), json=options.json)
 
 
+@app.command
+def lift(state: Literal["on", "off"], /, *, options: Options = DEFAULT) -> None:
+    """Put the simulated robot onto blocks, its wheels in the air, or down again.
+
+    Example: `canhelm sim lift on`
+    """
+    with options.client() as client:
+        show(client.call("simulation.lift", lifted=state == "on"), json=options.json)
+
+
+@app.command
+def hand(name: str, angle: float, /, *, options: Options = DEFAULT) -> None:
+    """Turn a wheel of the lifted simulated robot by hand, forward for a positive angle, or push a wheel pair.
+
+    Example: `canhelm sim hand front_left 360`
+
+    Args:
+        name: Wheel by its drive (front_left), or pair by its encoder (front), as the robot is built.
+        angle: Degrees.
+    """
+    with options.client() as client:
+        show(client.call("simulation.hand", name=name, angle_deg=angle), json=options.json)
+
+
+@app.command
+def look(*, options: Options = DEFAULT) -> None:
+    """What a person sees of the simulated robot: wheels, headings, brakes.
+
+    Example: `canhelm sim look`
+    """
+    with options.client() as client:
+        show(client.call("simulation.look"), json=options.json)
+
+
 @app.command(name="input")
 def digital_input(node: Node, number: Input, level: Literal["low", "high"], /, *, options: Options = DEFAULT) -> None:
     """Apply a level to a digital input of a simulated drive, as an emergency stop button does.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from canhelm.errors import Refused
+from canhelm.errors import Interlock, Refused
 from daemon.runtime.brake_commands import BrakeCommands
 from daemon.runtime.brick_commands import BrickCommands
 from daemon.runtime.config_commands import ConfigCommands
@@ -16,6 +16,7 @@ from daemon.runtime.node_commands import NodeCommands
 from daemon.runtime.path_commands import PathCommands, PathVehicle
 from daemon.runtime.simulation_commands import Network, SimulationCommands
 from daemon.runtime.supervisor import Supervisor
+from daemon.runtime.workshop_commands import Workshop, WorkshopCommands
 from drivers.contract import DriveState
 
 
@@ -25,9 +26,12 @@ class Commands:
     Args:
         supervisor: what decides.
         network: the simulated network; None where it is real.
+        workshop: where the simulated robot stands; None where it is real.
     """
 
-    def __init__(self, supervisor: Supervisor, network: Network | None = None) -> None:
+    def __init__(
+        self, supervisor: Supervisor, network: Network | None = None, workshop: Workshop | None = None
+    ) -> None:
         self._supervisor = supervisor
         self.handlers: dict[str, Handler] = {
             "stop": self._stop,
@@ -42,11 +46,13 @@ class Commands:
             **NodeCommands(supervisor).handlers,
             **ConfigCommands(supervisor).handlers,
             **SimulationCommands(supervisor, network).handlers,
+            **WorkshopCommands(workshop).handlers,
         }
-        for method in supervisor.vehicle.methods:
-            self.handlers[method] = self._vehicle_handler(method)
+        driving: dict[str, Handler] = {method: self._vehicle_handler(method) for method in supervisor.vehicle.methods}
         if isinstance(supervisor.vehicle, PathVehicle):
-            self.handlers |= PathCommands(supervisor, supervisor.vehicle).handlers
+            driving |= PathCommands(supervisor, supervisor.vehicle).handlers
+        self._driving = frozenset(driving)
+        self.handlers |= driving
 
     async def call(self, method: str, params: Params, lease: str | None) -> dict[str, Any]:
         """Carry out one method.
@@ -60,13 +66,24 @@ class Commands:
             The method's result.
 
         Raises:
-            CanhelmError: one of its leaves; Refused for a method that this vehicle does not have.
+            CanhelmError: one of its leaves; Refused for a method that this vehicle does not have, Interlock for a
+                motion of a vehicle that was not set up.
         """
         handler = self.handlers.get(method)
         if handler is None:
             have = ", ".join(sorted(self._supervisor.vehicle.methods)) or "none"
             raise Refused(f"this vehicle has no {method}", remedy=f"motions that it has: {have}")
+        if method in self._driving:
+            self._require_set_up()
         return await handler(params, lease)
+
+    def _require_set_up(self) -> None:
+        profile = self._supervisor.vehicle.profile
+        if profile.setup == "needed":
+            raise Interlock(
+                f"robot {profile.name} was not set up: nobody has seen yet which wheel turns which way",
+                remedy="`canhelm setup`, then start the daemon anew; or write setup: waived in its profile",
+            )
 
     # --- the whole vehicle -------------------------------------------------------------------------------------
 

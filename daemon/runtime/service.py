@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from daemon.runtime.commands import Commands
@@ -25,13 +26,22 @@ class Service:
         commands: the methods.
         bus: for load and counters.
         cycle: for its counters.
+        profile_file: where the robot's profile stands.
 
     Attributes:
         recorder: of every frame; None where nothing is recorded.
         found: what a first look at a bus without a profile has found.
     """
 
-    def __init__(self, robot: str, supervisor: Supervisor, commands: Commands, bus: Bus, cycle: Cycle) -> None:
+    def __init__(
+        self,
+        robot: str,
+        supervisor: Supervisor,
+        commands: Commands,
+        bus: Bus,
+        cycle: Cycle,
+        profile_file: Path | None = None,
+    ) -> None:
         self.robot = robot
         self.recorder: CandumpRecorder | None = None
         self.found: list[dict[str, Any]] = []
@@ -42,6 +52,7 @@ class Service:
         self._supervisor = supervisor
         self._bus = bus
         self._cycle = cycle
+        self._profile_file = profile_file
 
     @property
     def state(self) -> str:
@@ -68,6 +79,8 @@ class Service:
         supervisor = self._supervisor
         return {
             "robot": self.robot,
+            "profile_file": str(self._profile_file) if self._profile_file else None,
+            "setup": supervisor.vehicle.profile.setup,
             "state": self.state,
             "message": supervisor.message,
             "time_s": round(asyncio.get_running_loop().time(), 3),

@@ -12,6 +12,8 @@ from drivers.simulated.world import Axis
 GRAVITY_M_S2 = 9.81
 REST_SPEED = 1e-5
 """Speed [m/s, rad/s] below which a motion counts as rest."""
+HAND_RAD_S = 4.0
+"""Speed at which a hand turns a wheel (assumed)."""
 REST_STEPS = 50
 """Steps at rest, half a swing of the body on its tyres, after which the world stands still."""
 
@@ -24,6 +26,10 @@ class BodyWorld(ABC):
         mass_kg: of the robot.
         start: pose of the centre (x_m, y_m, yaw_rad).
         step_s: integration step.
+
+    Attributes:
+        lifted: whether it stands on blocks, its wheels in the air; only they move then.
+        hands: how far hands still turn wheels that are in the air and without current [rad], by their drives.
     """
 
     def __init__(
@@ -31,6 +37,8 @@ class BodyWorld(ABC):
     ) -> None:
         self.axes: dict[str, Axis] = {name: drive.axis for name, drive in drives.items()}
         self._drives = tuple(drives.values())
+        self.lifted = False
+        self.hands: dict[WheelDrive, float] = {}
         self._mass_kg = mass_kg
         self._x_m, self._y_m, self._yaw_rad = start
         self._cos, self._sin = cos(self._yaw_rad), sin(self._yaw_rad)
@@ -96,12 +104,34 @@ class BodyWorld(ABC):
             if self._a_demand_changes():
                 self._quiet_steps = 0
             if self._quiet_steps < REST_STEPS:
-                self._step()
+                (self._step_in_air if self.lifted else self._step)()
                 self._watch_for_rest()
             elif all(axis.torque_source is None for axis in self.axes.values()):
                 self._steps_done = steps
                 return
             self._steps_done += 1
+
+    def turn_by_hand(self, drive: str, angle_rad: float) -> None:
+        """Turn a wheel in the air by hand, from the last advanced time on; positive as it rolls forward."""
+        self.hands[self._drives[list(self.axes).index(drive)]] = angle_rad
+        self._quiet_steps = 0
+
+    def wheel_rad(self, drive: str) -> float:
+        """True angle of a wheel by its drive's name, positive as it rolls forward."""
+        return self._drives[list(self.axes).index(drive)].wheel_rad
+
+    def _step_in_air(self) -> None:
+        """Turn the wheels for one step, each for itself; a hand gives way to a motor that has current."""
+        dt = self._step_s
+        for drive in self._drives:
+            left = self.hands.pop(drive, 0.0)
+            if not left or drive.demand_a:
+                drive.turn(0.0, 0.0, dt)
+                continue
+            step = min(max(left, -HAND_RAD_S * dt), HAND_RAD_S * dt)
+            drive.follow(step / dt, dt)
+            if left != step:
+                self.hands[drive] = left - step
 
     def _a_demand_changes(self) -> bool:
         """Ask every drive for its demand in the coming step; True when one differs from the last."""

@@ -113,6 +113,19 @@ class WheelDrive:
         shaft = axis.speed_rad_s = self._shaft_per_wheel * speed
         axis.position_rad += shaft * dt_s
 
+    def follow(self, wheel_rad_s: float, dt_s: float) -> None:
+        """Turn for one step as a hand at the wheel does."""
+        self.wheel_rad_s = wheel_rad_s
+        self.rim_m_s = self._radius_m * wheel_rad_s
+        self.axis.current_a = 0.0
+        self.axis.speed_rad_s = self._shaft_per_wheel * wheel_rad_s
+        self.axis.position_rad += self.axis.speed_rad_s * dt_s
+
+    @property
+    def wheel_rad(self) -> float:
+        """Angle of the wheel, unwrapped, positive as it rolls forward."""
+        return self.axis.position_rad / self._shaft_per_wheel
+
     def _flowing(self, shaft_rad_s: float) -> float:
         """Current [A] that supply voltage and back-EMF let flow for a demand that they cannot meet.
 

@@ -6,6 +6,8 @@ import asyncio
 from functools import partial
 from random import Random
 
+import msgspec
+
 from drivers.simulated.ackermann import AckermannWorld
 from drivers.simulated.angle_sensor import SimulatedAngleSensor
 from drivers.simulated.body import BodyWorld
@@ -24,6 +26,8 @@ from profiles.schema import BrakeConfig, OmniGeometry, Profile
 from profiles.sensors import SensorDefects
 from profiles.steered import CarGeometry, SemitrailerGeometry
 
+FACTORY_NODE = 1
+"""Node id of a drive whose DIP switches nobody has set."""
 _BOOT_DELAY_S = (0.05, 0.15)
 """Shortest and longest time from power-up to the boot-up message (assumed)."""
 _WATCH_S = 0.01
@@ -68,10 +72,12 @@ class SimulatedNetwork:
         self.world = make_world(profile, seed)
         self.stand = StandWorld(profile, profile.drives.keys() - self.world.axes.keys(), seed)
         self.bricks = {name: simulated_brick(profile, name, seed) for name in profile.bricks}
+        simulation = profile.simulation
+        factory = simulation.factory if simulation else ()
         self.drives = {
             name: SimulatedEpos(
                 medium.port(name),
-                config,
+                msgspec.structs.replace(config, node=FACTORY_NODE) if name in factory else config,
                 self._world_of(name).axes[name],
                 self._world_of(name),
                 random.uniform(*_BOOT_DELAY_S),
@@ -79,7 +85,9 @@ class SimulatedNetwork:
             )
             for name, config in profile.drives.items()
         }
-        defects = profile.simulation.sensors if profile.simulation else {}
+        for name in factory:
+            self.drives[name].dictionary.forget()
+        defects = simulation.sensors if simulation else {}
         self.encoders = {
             name: SimulatedEncoder(
                 medium.port(name),

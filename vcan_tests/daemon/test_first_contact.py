@@ -49,7 +49,7 @@ class Bench:
         """Switch on a drive at factory settings."""
         port = self.medium.port(f"drive {node}")
         epos = SimulatedEpos(port, drive_config(node), self.world.axes["bench"], self.world, 0.05, seed=node)
-        epos.dictionary.commission({})
+        epos.dictionary.forget()
         epos.power_on()
         return epos
 

@@ -1,0 +1,75 @@
+"""What a person does to a simulated robot and sees of it in the workshop: lift it, turn wheels, push pairs, look."""
+
+from __future__ import annotations
+
+import asyncio
+from math import degrees, radians
+from typing import Any
+
+from drivers.simulated.max2d import Max2dWorld
+from drivers.simulated.network import SimulatedNetwork
+from profiles.schema import PairedSteerGeometry, Profile
+
+
+class Workshop:
+    """A person beside a simulated robot. Names are those of the robot as it is built, not as it is wired.
+
+    Args:
+        profile: the robot as it is built.
+        network: its network.
+    """
+
+    def __init__(self, profile: Profile, network: SimulatedNetwork) -> None:
+        self._profile = profile
+        self._network = network
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """What there is to turn and to push: wheels by their drives, pairs by their encoders."""
+        return (*self._network.world.axes, *self._pairs)
+
+    @property
+    def _pairs(self) -> dict[str, str]:
+        """Brakes of the wheel pairs by the pairs' encoders."""
+        vehicle = self._profile.vehicle
+        if not isinstance(vehicle, PairedSteerGeometry):
+            return {}
+        return dict(zip(vehicle.encoders, vehicle.brakes, strict=True))
+
+    def lift(self, lifted: bool) -> None:
+        """Put the robot onto blocks, or down again."""
+        self._now()
+        self._network.world.lifted = lifted
+
+    def turn(self, name: str, angle_deg: float) -> float:
+        """Turn by hand a wheel, which rolls forward for a positive angle and takes its time, or push a wheel pair.
+
+        Returns:
+            By how much it gives way [degrees]: nothing for a pair that is locked, or a wheel on the floor.
+        """
+        self._now()
+        world = self._network.world
+        if name not in self._pairs:
+            if world.lifted:
+                world.turn_by_hand(name, radians(angle_deg))
+            return angle_deg if world.lifted else 0.0
+        if self._network.brakes[self._pairs[name]].engaged:
+            return 0.0
+        assert isinstance(world, Max2dWorld)
+        before = world.heading_rad(name)
+        world.set_heading(name, before + radians(angle_deg))
+        return degrees(world.heading_rad(name) - before)
+
+    def look(self) -> dict[str, Any]:
+        """What can be seen: wheels' angles, headings of the pairs, positions of the brakes."""
+        self._now()
+        world = self._network.world
+        return {
+            "lifted": world.lifted,
+            "wheel_deg": {name: round(degrees(world.wheel_rad(name)), 2) for name in world.axes},
+            "heading_deg": {name: round(degrees(world.heading_rad(name)), 2) for name in self._pairs},
+            "brakes_engaged": {name: brake.engaged for name, brake in self._network.brakes.items()},
+        }
+
+    def _now(self) -> None:
+        self._network.world.advance(asyncio.get_running_loop().time())
