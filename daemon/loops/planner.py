@@ -10,7 +10,7 @@ another loop. `follow` therefore keeps the plan within a tolerance; do not plan 
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
 
@@ -210,10 +210,17 @@ def follow(
 def _plannable(start: PlanarState, goal: PlanarState, limits: PlanarLimits, now: float) -> bool:
     low, high = LIMIT_RANGE
     return (
-        all(abs(number) <= FARTHEST for number in (*astuple(start), *astuple(goal)))
-        and all(low <= limit <= high for limit in astuple(limits))
+        all(abs(number) <= FARTHEST for number in (*_numbers(start), *_numbers(goal)))
+        and all(
+            low <= limit <= high
+            for limit in (limits.speed, limits.acceleration, limits.rate, limits.angular_acceleration)
+        )
         and abs(now) <= LATEST_S
     )
+
+
+def _numbers(state: PlanarState) -> tuple[float, ...]:
+    return state.x, state.y, state.heading, state.vx, state.vy, state.rate
 
 
 def _nothing(goal: PlanarState, limits: PlanarLimits) -> Plan:

@@ -85,14 +85,23 @@ def bends(travel: Vector, start: Vector, end: Vector) -> Iterator[Bend]:
 
 
 def _bend_near(travel: Vector, start: Vector, end: Vector, side: float, guess: Vector) -> Bend | None:
+    (px, py), (vx, vy) = travel, start
+    dx, dy = end[0] - vx, end[1] - vy
+    change = math.hypot(dx, dy)
+
     def missing(u0: float, u1: float) -> Vector:
+        """The travel less that of `bend_between`, without the bend: in units of its shortest costate d."""
         if not -MOST < u0 < u1 < MOST:
             return math.inf, math.inf
-        arc = bend_between(start, end, side, u0, u1)
-        x, y, _, _ = arc.at(arc.duration)
-        return travel[0] - x, travel[1] - y
+        s0, r0, s1, r1 = math.sinh(u0), math.cosh(u0), math.sinh(u1), math.cosh(u1)
+        turned, time = u1 - u0, s1 - s0
+        along, across = 2 * math.sinh((u0 - u1) / 2) * math.sinh((u0 + u1) / 2), side * turned
+        square = along * along + across * across
+        d = change / math.sqrt(square)
+        x, y = r0 * time - (s1 * r1 - s0 * r0 + turned) / 2, side * (s1 * turned + along)
+        c, n = (dx * along + dy * across) / square, (dy * along - dx * across) / square
+        return px - d * (vx * time + c * x - n * y), py - d * (vy * time + n * x + c * y)
 
-    change = math.hypot(end[0] - start[0], end[1] - start[1])
     ends = solve_pair(missing, guess, ROUNDING * (math.hypot(*travel) + change * change), 1.5)
     return bend_between(start, end, side, *ends) if ends else None
 
@@ -114,7 +123,13 @@ def bend_between(start: Vector, end: Vector, side: float, u0: float, u1: float) 
 
 
 def top_speed(arc: Bend) -> float:
-    """The highest speed within a bend: where speed stops to rise between two of its samples, by bisection."""
+    """The highest speed within a bend, or 1 where it is certainly no higher.
+
+    The velocity keeps to one side of its tangents at both ends, so where they cross within the limit, all of it is.
+    Else it is found where speed stops to rise between two samples, by bisection.
+    """
+    if _crossing_speed(arc) <= 1.0:
+        return 1.0
     samples = [arc.duration * k / SAMPLES for k in range(SAMPLES + 1)]
     rises = [_speed_rises(arc, time) for time in samples]
     tops = [samples[0], samples[-1]]
@@ -127,16 +142,32 @@ def top_speed(arc: Bend) -> float:
     return max(math.hypot(*arc.at(time)[2:]) for time in tops)
 
 
+def _crossing_speed(arc: Bend) -> float:
+    """Speed where the tangents of the velocity at both ends of a bend cross."""
+    _, _, ex, ey = arc.at(arc.duration)
+    (vx, vy), (ax, ay), (bx, by) = arc.velocity, _costate(arc, 0.0), _costate(arc, arc.duration)
+    turning = ax * by - ay * bx
+    if turning == 0.0:
+        return math.inf
+    way = ((ex - vx) * by - (ey - vy) * bx) / turning
+    return max(math.hypot(vx, vy), math.hypot(ex, ey), math.hypot(vx + way * ax, vy + way * ay))
+
+
+def _costate(arc: Bend, time: float) -> Vector:
+    """In the direction of the acceleration."""
+    s = arc.shortest * math.sinh(arc.begin) + time
+    (c, n), d = arc.direction, arc.side * arc.shortest
+    return -s * c - d * n, d * c - s * n
+
+
 SAMPLES: Final = 16
 
 
 def _speed_rises(arc: Bend, time: float) -> bool:
     """Whether velocity and costate point the same way."""
-    s = arc.shortest * math.sinh(arc.begin) + time
-    c, n = arc.direction
-    d = arc.side * arc.shortest
     _, _, vx, vy = arc.at(time)
-    return vx * (-s * c - d * n) + vy * (d * c - s * n) > 0
+    x, y = _costate(arc, time)
+    return vx * x + vy * y > 0
 
 
 def solve_pair(

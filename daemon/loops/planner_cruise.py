@@ -17,8 +17,6 @@ Half = Callable[[float, float], Vector]
 
 STEEPEST: Final = math.pi / 3
 """An optimal bend meets the circle of the speed limit no farther than this from the cruise."""
-FIRST_STEP: Final = 1e-3
-"""By which the heading is changed first [rad]."""
 FLAT: Final = 1e-13
 """Below this, a velocity across is none."""
 
@@ -35,7 +33,7 @@ def cruise(half: Half, travel: Vector, start: Vector, end: Vector, heading: floa
         end: velocity at the goal.
         heading: where the search begins [rad].
     """
-    step, last_across = FIRST_STEP, math.nan
+    step = last_across = math.nan
     for _ in range(16):
         c, s = math.cos(heading), math.sin(heading)
         first_along, first_across = half(start[0] * c + start[1] * s, start[1] * c - start[0] * s)
@@ -44,9 +42,11 @@ def cruise(half: Half, travel: Vector, start: Vector, end: Vector, heading: floa
         across = travel[1] * c - travel[0] * s - first_across - end_across
         if abs(across) < 1e-13 * (1 + abs(along)):
             return (heading, along) if along >= 0.0 else None
-        if last_across != across and not math.isnan(last_across):
+        if math.isnan(last_across):
+            step = across / (1 + abs(along))
+        elif last_across != across:
             step *= across / (last_across - across)
-            step = max(-0.5, min(0.5, step))
+        step = max(-0.5, min(0.5, step))
         heading, last_across = heading + step, across
     return None
 
