@@ -8,15 +8,14 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from random import Random
 from typing import Any
 
 from canhelm.errors import UsageError
 from daemon.demo_robot import DemoRobot
+from daemon.demo_tracking import tracked
 from daemon.loops.odometry import Pose
 from daemon.loops.path import Path as Way
 from daemon.loops.path import wrap
@@ -33,9 +32,6 @@ GROUP = "semitrailer"
 """Name of all figures together."""
 BESIDE_M = 0.1
 """So far from the path line and circle begin."""
-FIX_S = 0.1
-FIX_NOISE_M, FIX_NOISE_RAD = 0.005, math.radians(0.3)
-FIX_WEIGHT = 0.1
 SETTLED_M = 2.5
 """Way after which an error that was there at the begin counts as settled."""
 
@@ -149,7 +145,7 @@ async def drive(
     await robot.app.start()
     try:
         await robot.boot("two drives and two encoders")
-        with _tracked(robot, vehicle, world, seed):
+        with tracked(robot, lambda: world.pose, vehicle.locate, seed):
             return await _drive(robot, vehicle, world, manoeuvre, published)
     finally:
         await robot.app.close()
@@ -161,28 +157,6 @@ def _place(vehicle: SemitrailerVehicle, world: SemitrailerWorld, manoeuvre: Mano
     ahead = vehicle.kinematics.straight_lead_m if first.drive == "backward" else 0.0
     world.place((ahead, manoeuvre.beside_m, 0.0))
     vehicle.locate(Pose(ahead, manoeuvre.beside_m))
-
-
-@contextmanager
-def _tracked(robot: DemoRobot, vehicle: SemitrailerVehicle, world: SemitrailerWorld, seed: int) -> Iterator[None]:
-    """While it is open, a tracking system tells the vehicle where the truck is."""
-    random, loop = Random(seed), asyncio.get_running_loop()
-    due_s = loop.time()
-
-    def look() -> None:
-        nonlocal due_s
-        if loop.time() < due_s:
-            return
-        due_s += FIX_S
-        (x, y, yaw), noise = world.pose, random.gauss
-        fix = Pose(x + noise(0.0, FIX_NOISE_M), y + noise(0.0, FIX_NOISE_M), yaw + noise(0.0, FIX_NOISE_RAD))
-        vehicle.locate(fix, FIX_WEIGHT)
-
-    robot.app.supervisor.observers.append(look)
-    try:
-        yield
-    finally:
-        robot.app.supervisor.observers.remove(look)
 
 
 async def _drive(

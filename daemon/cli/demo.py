@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from canhelm.errors import UsageError
+from daemon.cli.demo_ackermann import demo_ackermann
+from daemon.cli.demo_max2d_path import demo_max2d_path
 from daemon.cli.demo_semitrailer import demo_semitrailer
 from daemon.cli.demo_view import DemoView
 from daemon.cli.output import Json, say, show, words
@@ -24,6 +26,8 @@ if TYPE_CHECKING:
     from profiles.schema import Profile
 
 NXT = "nxt"
+PATH_IN_PIECES = "path-in-pieces"
+ACKERMANN = ("ackermann", "step-from-rest", "step-to-the-right", "step-slower", "step-far")
 SEMITRAILER = ("semitrailer", "line-backwards", "circle-backwards", "park-parallel", "park-perpendicular")
 
 
@@ -45,7 +49,8 @@ def demo(
         figure: One figure of the MAX2D (4.6, 4.7, 4.15 or 4.16), all of them without it; one of the Turtle (7.3, 7.4,
             7.6, 7.7, ice-off, ice-on), or `turtle` for all of those; `nxt` for the NXT robot's;
             one of the semi-trailer (line-backwards, circle-backwards, park-parallel, park-perpendicular), or
-            `semitrailer` for all of those.
+            `semitrailer` for all of those; one of the Ackermann car (step-from-rest, step-to-the-right, step-slower,
+            step-far), or `ackermann` for all of those; `path-in-pieces`, the MAX2D on a path.
         virtual_time: As fast as the processor goes instead of in real time; the same run every time.
         seed: Seed of everything random in the simulated network.
         out: Folder for pictures and the candump log.
@@ -59,19 +64,18 @@ def demo(
 
     if figure == NXT:
         return _nxt(load(profile or NXT).profile, seed, out, json, run_virtual if virtual_time else run_precise)
-    if figure in SEMITRAILER:
+    runner = run_virtual if virtual_time else run_precise
+    if figure in (*SEMITRAILER, *ACKERMANN, PATH_IN_PIECES):
         if out is not None:
             _make_folder(out)
         _end_by_signals()
-        vehicle, runner = load(profile or "semitrailer").profile, run_virtual if virtual_time else run_precise
-        return demo_semitrailer(figure, vehicle, seed, out, json, runner, _can_draw)
+        return _on_paths(figure, profile, seed, out, json, runner)
     figures = tuple(entry for entry in FIGURES if figure in (None, entry.identity))
     turtle = tuple(entry for entry in demo_turtle.FIGURES if figure in (demo_turtle.GROUP, entry.identity))
     if not figures and not turtle:
+        others = (demo_turtle.GROUP, NXT, *SEMITRAILER, *ACKERMANN, PATH_IN_PIECES)
         have = ", ".join(entry.identity for entry in (*FIGURES, *demo_turtle.FIGURES))
-        raise UsageError(
-            f"no figure {figure!r}", remedy=f"one of {have}, {demo_turtle.GROUP}, {NXT}, {', '.join(SEMITRAILER)}"
-        )
+        raise UsageError(f"no figure {figure!r}", remedy=f"one of {have}, {', '.join(others)}")
     robot = load(profile or ("turtle" if turtle else "max2d")).profile
     if turtle and bus != "simulated":
         raise UsageError("the accelerometer needs CAN", value=bus, remedy="leave --bus out")
@@ -82,7 +86,6 @@ def demo(
     if out is not None:
         _make_folder(out)
     _end_by_signals()
-    runner = run_virtual if virtual_time else run_precise
     if turtle:
         return _turtle(turtle, robot, seed, out, json, runner)
     with DemoView(every=100 if virtual_time else 10) as view:
@@ -95,6 +98,18 @@ def demo(
     if out is not None:
         _draw(results, robot.vehicle, out)
     return 0
+
+
+def _on_paths(
+    figure: str, profile: str | None, seed: int, out: Path | None, json: bool | None, runner: Callable[..., Any]
+) -> int:
+    """A figure of a vehicle that steers while it rolls, or of the MAX2D on a path."""
+    from profiles.loader import load
+
+    if figure == PATH_IN_PIECES:
+        return demo_max2d_path(load(profile or "max2d").profile, seed, out, json, runner, _can_draw)
+    group, drive = (SEMITRAILER, demo_semitrailer) if figure in SEMITRAILER else (ACKERMANN, demo_ackermann)
+    return drive(figure, load(profile or group[0]).profile, seed, out, json, runner, _can_draw)
 
 
 def _turtle(

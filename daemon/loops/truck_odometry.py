@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from daemon.loops.odometry import MAX_STEP_M, Pose, moved_along_arc
+from daemon.loops.path import wrap
 
 
 class TruckOdometry:
@@ -40,3 +41,14 @@ class TruckOdometry:
         elif way:
             self.pose = moved_along_arc(self.pose, way, 0.0, way * math.tan(mean) / self._wheelbase_m)
         return self.pose
+
+    def correct(self, pose: Pose, weight: float) -> None:
+        """Take over what somebody else says of the pose.
+
+        Args:
+            pose: of the driven axle's middle.
+            weight: of that against the own pose: 1 believes it, 0 does not.
+        """
+        own = self.pose
+        x, y = own.x_m + weight * (pose.x_m - own.x_m), own.y_m + weight * (pose.y_m - own.y_m)
+        self.pose = Pose(x, y, own.yaw_rad + weight * wrap(pose.yaw_rad - own.yaw_rad))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, Final
 
 from canhelm.errors import LimitExceeded, Refused, UsageError
@@ -157,6 +158,11 @@ class CarVehicle(SteeredVehicle):
         speed = (measurement.wheel_speed_m_s[0] + measurement.wheel_speed_m_s[1]) / 2
         self.reading = VehicleReading(pose, (), steering, speed)
         return measurement
+
+    def locate(self, rear_axle: Pose, weight: float = 1.0) -> None:
+        """Go on from where somebody else says that the rear axle's middle is; weight 1 believes it, 0 does not."""
+        self.odometry.correct(rear_axle, weight)
+        self.reading = replace(self.reading, truck=self.odometry.pose)
 
     def require_free(self, motion: Motion) -> None:
         """The laws need the steering angle."""

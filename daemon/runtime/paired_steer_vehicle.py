@@ -25,7 +25,7 @@ from daemon.loops.path_in_pieces import PiecePlanner
 from daemon.runtime.motions import Motion
 from daemon.runtime.paired_steer_motions import PairedSteerMotion, StreamMotion
 from daemon.runtime.path_building import build_path
-from daemon.runtime.path_commands import PathPlan, PathRequest
+from daemon.runtime.path_commands import PathRequest
 from daemon.runtime.path_in_pieces import PiecesPlan
 from daemon.runtime.vehicle import Vehicle
 from drivers.contract import Brake, Drive, SteeringEncoder
@@ -96,7 +96,7 @@ class PairedSteerVehicle(Vehicle):
             return parallel_target(math.radians(params["angle_deg"]), speed, duration)
         return turn_target(math.radians(params["rear_deg"]), math.radians(params["front_deg"]), speed, duration)
 
-    async def plan_path(self, request: PathRequest) -> PathPlan:
+    async def plan_path(self, request: PathRequest) -> PiecesPlan:
         """The pieces in which a path is followed; the robot stops and steers between them.
 
         Raises:

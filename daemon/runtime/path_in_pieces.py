@@ -8,11 +8,11 @@ from typing import Any, Protocol
 from canhelm.errors import DeviceFault, Refused
 from daemon.loops.measurement import Command, Measurement
 from daemon.loops.odometry import Odometry
+from daemon.loops.paired_steer import PairedSteerLaw
 from daemon.loops.paired_steer_piece import DrivenPiece, aimed, target_of
 from daemon.loops.paired_steer_target import PairedSteerTarget
 from daemon.loops.path import Path
 from daemon.loops.path_in_pieces import distance
-from daemon.runtime.motions import Motion
 from daemon.runtime.paired_steer_motions import PairedSteerMotion
 from daemon.runtime.path_commands import PathPlan
 from profiles.schema import Limits, PairedSteerGeometry
@@ -31,6 +31,10 @@ class Robot(Protocol):
     names: tuple[str, ...]
     odometry: Odometry
 
+    def new_law(self) -> PairedSteerLaw:
+        """A law at rest, for one motion."""
+        ...
+
 
 class PiecesPlan(PathPlan):
     """The pieces that were chosen.
@@ -40,25 +44,30 @@ class PiecesPlan(PathPlan):
         path: to be followed.
         pieces: in the order of travel.
         speed_m_s: no faster than.
+
+    Attributes:
+        way: the path.
+        pieces: as given.
     """
 
     def __init__(self, robot: Robot, path: Path, pieces: list[DrivenPiece], speed_m_s: float) -> None:
-        self._robot, self._path, self._pieces, self._speed_m_s = robot, path, pieces, speed_m_s
+        self.way, self.pieces = path, pieces
+        self._robot, self._speed_m_s = robot, speed_m_s
 
     def summary(self) -> dict[str, Any]:
         """Number and largest deviation, and each piece with its own."""
         geometry, limits = self._robot.geometry, self._robot.limits
-        told = [_told(one, target_of(geometry, limits, one, self._speed_m_s)) for one in self._pieces]
+        told = [_told(one, target_of(geometry, limits, one, self._speed_m_s)) for one in self.pieces]
         return {
-            "stops": len(self._pieces) - 1,
-            "length_m": round(sum(one.piece.length_m for one in self._pieces), 4),
-            "deviation_m": round(max(one.deviation_m for one in self._pieces), 4),
+            "stops": len(self.pieces) - 1,
+            "length_m": round(sum(one.piece.length_m for one in self.pieces), 4),
+            "deviation_m": round(max(one.deviation_m for one in self.pieces), 4),
             "pieces": told,
         }
 
-    def motion(self, lease: str | None) -> Motion:
+    def motion(self, lease: str | None) -> PathInPieces:
         """The motion; refused where the robot is not at the path's beginning."""
-        pose, (x, y) = self._robot.odometry.pose, self._path.pieces[0].point(0.0)
+        pose, (x, y) = self._robot.odometry.pose, self.way.pieces[0].point(0.0)
         away = math.hypot(pose.x_m - x, pose.y_m - y)
         if away > AT_BEGIN_M:
             raise Refused(
@@ -67,7 +76,7 @@ class PiecesPlan(PathPlan):
                 limit=AT_BEGIN_M,
                 remedy="leave start: out of the path file, or drive to its beginning first",
             )
-        return PathInPieces(lease, self._robot, self._path, self._pieces, self._speed_m_s, self.summary())
+        return PathInPieces(lease, self._robot, self.way, self.pieces, self._speed_m_s, self.summary())
 
 
 def _told(one: DrivenPiece, target: PairedSteerTarget) -> dict[str, Any]:
@@ -97,6 +106,7 @@ class PathInPieces(PairedSteerMotion):
         summary: of the plan.
 
     Attributes:
+        number: of the piece under way, from 0.
         driven_m: largest distance of the robot's centre from the path so far, by odometry, piece by piece.
     """
 
@@ -112,7 +122,7 @@ class PathInPieces(PairedSteerMotion):
         super().__init__("drive.path", robot.names, lease, robot.new_law(), None)
         self._robot, self._path, self._pieces, self._speed_m_s = robot, path, pieces, speed_m_s
         self._summary = summary
-        self._number = 0
+        self.number = 0
         self.driven_m = [0.0] * len(pieces)
         self._go_on(0)
 
@@ -122,20 +132,20 @@ class PathInPieces(PairedSteerMotion):
         return super().step(measurement, dt_s)
 
     def _measure(self) -> None:
-        pose, piece = self._robot.odometry.pose, self._pieces[self._number]
+        pose, piece = self._robot.odometry.pose, self._pieces[self.number]
         stretch = self._path.pieces[piece.first : piece.last + 1]
         off = min(distance(one, (pose.x_m, pose.y_m)) for one in stretch)
-        self.driven_m[self._number] = max(self.driven_m[self._number], off)
+        self.driven_m[self.number] = max(self.driven_m[self.number], off)
 
     def on_done(self, now_s: float) -> None:
         """A piece is over: go on with the next one that is a way at all, or end."""
-        if self.stop_reason or not self._go_on(self._number + 1):
+        if self.stop_reason or not self._go_on(self.number + 1):
             super().on_done(now_s)
 
     def _go_on(self, number: int) -> bool:
         """Steer for the first piece from ``number`` on that is a way at all; False where there is none."""
         for index in range(number, len(self._pieces)):
-            self._number = index
+            self.number = index
             target = self._aimed()
             if target is None or target.distance_m is None or target.distance_m >= SHORTEST_M:
                 self._target = target
@@ -145,9 +155,9 @@ class PathInPieces(PairedSteerMotion):
     def _aimed(self) -> PairedSteerTarget | None:
         """The motion for the piece under way, from where the robot is; without one it has failed."""
         robot = self._robot
-        piece = aimed(robot.geometry, robot.limits, self._pieces[self._number], robot.odometry.pose)
+        piece = aimed(robot.geometry, robot.limits, self._pieces[self.number], robot.odometry.pose)
         if piece is None:
-            message = f"piece {self._number} of the way cannot be steered from where the robot is"
+            message = f"piece {self.number} of the way cannot be steered from where the robot is"
             remedy = "drive from here by a new path, more slowly; `canhelm status` shows the odometry"
             self.fail(DeviceFault(f"{self.kind}: {message}", remedy=remedy))
             return None
@@ -172,5 +182,5 @@ class PathInPieces(PairedSteerMotion):
 
     def progress(self) -> dict[str, Any]:
         """As of any motion, and which piece, and the largest distance from the path so far."""
-        number = f"{self._number + 1} of {len(self._pieces)}"
+        number = f"{self.number + 1} of {len(self._pieces)}"
         return {**super().progress(), "piece": number, "driven_deviation_m": round(max(self.driven_m), 4)}

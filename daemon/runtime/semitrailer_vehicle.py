@@ -10,7 +10,6 @@ from canhelm.errors import LimitExceeded
 from daemon.loops.articulated import ArticulatedVehicle, Hitch
 from daemon.loops.measurement import Measurement
 from daemon.loops.odometry import Pose
-from daemon.loops.path import wrap
 from daemon.loops.path_driving import VehicleReading
 from daemon.loops.path_following import FollowingTuning
 from daemon.loops.path_speed import SpeedTuning
@@ -89,9 +88,7 @@ class SemitrailerVehicle(SteeredVehicle):
             truck: its pose.
             weight: of that against the odometry's: 1 believes it, 0 does not.
         """
-        own = self.odometry.pose
-        x, y = own.x_m + weight * (truck.x_m - own.x_m), own.y_m + weight * (truck.y_m - own.y_m)
-        self.odometry.pose = Pose(x, y, own.yaw_rad + weight * wrap(truck.yaw_rad - own.yaw_rad))
+        self.odometry.correct(truck, weight)
         self.reading = replace(self.reading, truck=self.odometry.pose)
 
     # --- motions -----------------------------------------------------------------------------------------------
