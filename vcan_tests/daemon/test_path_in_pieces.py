@@ -16,7 +16,7 @@ from daemon.loops.geometry import solve_turning
 from daemon.loops.odometry import Pose
 from daemon.loops.paired_steer_piece import DrivenPiece, aimed, bow, steered, target_of
 from daemon.loops.path import Path, Piece, arc, line
-from daemon.loops.path_in_pieces import NEAR_M, SAME_M, PiecePlanner
+from daemon.loops.path_in_pieces import MAX_SWEEP_RAD, NEAR_M, SAME_M, PiecePlanner
 from profiles.loader import load
 from profiles.schema import PairedSteerGeometry
 
@@ -170,6 +170,7 @@ def test_no_piece_is_farther_from_the_path_than_the_tolerance(shape: list[tuple[
 @given(st.floats(0.2, 1.2), curvatures)
 @settings(max_examples=40, deadline=None)
 def test_the_arc_is_chosen_where_it_is_nearer_than_the_line(length: float, curvature: float) -> None:
+    assume(length * abs(curvature) < MAX_SWEEP_RAD)
     path = chained([(length, curvature)])
     plan = planned(path)
     if steered(GEOMETRY, LIMITS, 0.0, curvature, math.radians(1.5)) is not None:
