@@ -30,6 +30,12 @@ class GuardedSide:
             self._timer.cancel()
             self._timer = None
 
+    def life_time_changed(self) -> None:
+        """A life time of 0 ends life guarding until the next request; the toggle bit goes on."""
+        if self._timer is not None and not self._life_time_s():
+            self._timer.cancel()
+            self._timer = None
+
     def answer(self, state: int, now_s: float) -> bytes:
         """The data that answers a request: toggle bit and NMT state."""
         data = bytes((self._toggle | state,))
@@ -46,5 +52,5 @@ class GuardedSide:
         loop = asyncio.get_running_loop()
         if loop.time() < self._end_s:
             self._timer = loop.call_at(self._end_s, self._look)
-        elif self._life_time_s():
+        else:
             self._master_lost()

@@ -20,6 +20,7 @@ from drivers.simulated.sdo_block_server import BlockServer
 from drivers.simulated.sdo_server import SdoServer
 
 _NMT, _SYNC, _EMCY, _SDO_ANSWER, _SDO_REQUEST, _GUARDING = 0x000, 0x080, 0x080, 0x580, 0x600, 0x700
+_GUARD_TIME, _LIFE_TIME_FACTOR = 0x100C, 0x100D
 _EMERGENCY = struct.Struct("<HB5s")
 _HIGHEST_NODE_ID = 127
 _COMMUNICATION_RESET_S = 0.005
@@ -338,6 +339,8 @@ class SimulatedNode:
             readers[index, 1] = lambda: 1
             checks[index, 1] = signature_check(code)
             actions[index, 1] = _ignoring_value(act)
+        for index in (_GUARD_TIME, _LIFE_TIME_FACTOR):
+            actions[index, 0] = lambda _: self._guarding.life_time_changed()
         pdos: list[Pdo] = [*self._rpdos, *self.tpdos]
         for pdo in pdos:
             for address in pdo.configuration:

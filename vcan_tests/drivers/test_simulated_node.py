@@ -195,6 +195,18 @@ async def test_a_lost_master_is_noticed_after_the_life_time() -> None:
     assert bench.emergencies() == [0x8130]
 
 
+async def test_a_life_time_of_0_ends_life_guarding_until_the_next_request() -> None:
+    bench = await life_guarded()
+    await bench.master.guard(1)
+    await bench.u8(0x100D, 0, 0)
+    await bench.u8(0x100D, 0, 3)
+    await asyncio.sleep(0.5)
+    assert bench.emergencies() == []
+    await bench.master.guard(1)
+    await asyncio.sleep(0.5)
+    assert bench.emergencies() == [0x8130]
+
+
 async def test_each_request_prolongs_the_life_time() -> None:
     bench = await life_guarded()
     for _ in range(10):
