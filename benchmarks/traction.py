@@ -3,7 +3,7 @@
     .venv/bin/python -m benchmarks.traction [SEEDS]
 
 Each scenario is driven without traction control, with the published one, and with the improved one by accelerometer and
-by motor currents alone; first on the small plant of the tests, then on the simulated Turtle.
+by motor currents alone; first on the small plant of the tests, then on the simulated Turtle. Last the MAX2D.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from profiles.schema import FloorPatch
 from vcan_tests.daemon.gripping_robot import FLOOR_ROBOT, Drive, Floor, Way, drive
 from vcan_tests.daemon.omni_floor import ICE, OmniFloor, dry, ice_between
 from vcan_tests.daemon.omni_twin import TwinFloor, robot_data, turtle
+from vcan_tests.daemon.test_max2d_traction import WHERE, driven
 
 GOAL = PlanarState(3.0, 0.0)
 HEAD = f"{'':34}{'arrives':>8}{'lost':>7}{'aside':>8}{'end off':>9}{'changes':>9}{'turns':>7}{'found/missed/false':>20}"
@@ -80,6 +81,15 @@ def simulated_turtle(scenario: str, seed: int) -> Floor:
     return TwinFloor(turtle(ice=patch(*bounds)) if bounds else turtle(), seed)
 
 
+def max2d() -> None:
+    """The MAX2D over the bus: the largest slip of a wheel while it drives 1.2 m straight ahead and comes to rest."""
+    print("\nsimulated MAX2D over the bus, 0.8 m/s2, ice of friction 0.03 under all wheels; largest slip")
+    for ice in (None, *WHERE):
+        off, on = driven(False, ice), driven(True, ice)
+        slips = f"{off.worst_slip_m_s:.3f} m/s off, {on.worst_slip_m_s:.3f} m/s on"
+        print(f"  {ice or 'dry':34}{slips}, held in {on.held_cycles} cycles")
+
+
 def cost_us() -> float:
     """Median duration of one step of slip detection and safety factor."""
     traction, durations = Traction(1.5), []
@@ -95,6 +105,7 @@ def main() -> None:
     print(f"seeds {seeds.start} to {seeds.stop - 1}; ice has a friction of {ICE}")
     compare("small plant, accelerometer noise 0.1 m/s2", small_plant, False, seeds)
     compare("simulated Turtle", simulated_turtle, True, seeds)
+    max2d()
     print(f"\none step of traction control: {cost_us():.1f} us at the median")
 
 

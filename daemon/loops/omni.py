@@ -2,7 +2,7 @@
 
 A wheel rolls in its own direction and is free across it. Its rim speed is the robot's speed along that direction plus
 yaw rate times lever, the distance of the robot's centre from the line on which the wheel rolls. Three wheels determine
-the body's motion; with more of them it is the least-squares one, and what remains of each wheel is a sign of slip.
+the body's motion; with more of them it is the least-squares one.
 """
 
 from __future__ import annotations
@@ -73,11 +73,6 @@ class OmniKinematics:
         """Motion of the body that fits the rim speeds [m/s] best."""
         forward, left, turn = self.inverse
         return (_dot(forward, wheel_speeds), _dot(left, wheel_speeds), _dot(turn, wheel_speeds))
-
-    def residuals(self, wheel_speeds: Sequence[float]) -> tuple[float, ...]:
-        """What of each rim speed [m/s] no motion of the body explains; 0 with three wheels."""
-        explained = self.wheel_speeds(self.body_motion(wheel_speeds))
-        return tuple(speed - fitted for speed, fitted in zip(wheel_speeds, explained, strict=True))
 
 
 def _dot(row: Sequence[float], column: Sequence[float]) -> float:

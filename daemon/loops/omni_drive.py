@@ -3,9 +3,7 @@
 The wheels are commanded the reference's velocity, and on top of it a velocity in proportion to the distance from the
 reference as it was when the wheels were last told; so a robot that follows as it should is not corrected.
 
-While wheels slip the reference waits for the robot: a plan that starts from what was commanded leaves the wheels
-spinning. It is then no more than a little faster than the robot moves, and a wheel that slips no more than a little
-faster than the floor.
+A wheel that slips is held near the speed of the floor under it, where an accelerometer tells that.
 """
 
 from __future__ import annotations
@@ -65,7 +63,7 @@ class OmniLaw:
         guide: leads the reference.
         limits: for coming to rest when the motion is stopped.
         senses: of the robot, as it begins.
-        answers_slip: wait for the robot and hold its wheels while they slip.
+        holds_wheels: while they slip.
     """
 
     def __init__(
@@ -75,12 +73,12 @@ class OmniLaw:
         limits: PlanarLimits,
         senses: OmniSenses,
         *,
-        answers_slip: bool = True,
+        holds_wheels: bool = True,
     ) -> None:
         self._kinematics = kinematics
         self._guide = guide
         self._limits = limits
-        self._grip = WheelGrip(len(kinematics.forward)) if answers_slip else None
+        self._grip = WheelGrip(len(kinematics.forward)) if holds_wheels else None
         self._reference = _state(senses.pose, senses.motion)
         self._passed: deque[PlanarState] = deque()
         self._commanded: Vector = (0.0, 0.0)
@@ -107,9 +105,8 @@ class OmniLaw:
         self._reference, self._commanded = guidance.next, guidance.acceleration_m_s2
         error = self._error(pose, dt)
         wheels = self._kinematics.wheel_speeds(self._motion(pose, error, dt))
-        if self._grip and (seen := senses.observed):
-            held = seen.slipping if felt.pushing else (False,) * len(wheels)
-            wheels = self._grip.step(wheels, seen.ground_m_s, held, dt).wheel_speeds_m_s
+        if self._grip and senses.centre and (seen := senses.observed):
+            wheels = self._grip.step(wheels, seen.ground_m_s, seen.slipping, dt).wheel_speeds_m_s
         done = self._is_done(guidance, pose, dt)
         return Command(wheels), OmniRecord(guidance, felt, error, self._stopping, done)
 

@@ -79,7 +79,7 @@ class Guide(Protocol):
         """One cycle.
 
         Args:
-            reference: where the last cycle led; while wheels slip, near the robot.
+            reference: where the last cycle led.
             felt: of the robot.
             commanded: acceleration of the reference in the last cycle [m/s2].
             dt: length of the cycle [s].

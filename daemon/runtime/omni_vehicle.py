@@ -184,7 +184,7 @@ class OmniVehicle(Vehicle):
 
     def _law(self, guide: Guide) -> OmniLaw:
         published = isinstance(guide, PublishedGuide)
-        return OmniLaw(self._kinematics, guide, self.limits, self.senses, answers_slip=not published)
+        return OmniLaw(self._kinematics, guide, self.limits, self.senses, holds_wheels=not published)
 
     def _check(self, goal: PlanarState, limits: PlanarLimits) -> None:
         numbers = (goal.x, goal.y, goal.heading, goal.vx, goal.vy, limits.speed, limits.acceleration)
