@@ -71,7 +71,7 @@ async def _on_bus(profile: Profile, spec: str) -> int:
 
     wire = make_wire(spec, profile, 0)
     master = Master(wire.bus, wire.profile.network)
-    bricks = asyncio.create_task(_stop_bricks(wire.bricks))
+    bricks = asyncio.create_task(stop_bricks(wire.bricks))
     try:
         await master.start()
         return await secure(master, wire.profile) if profile.drives else 0
@@ -83,7 +83,7 @@ async def _on_bus(profile: Profile, spec: str) -> int:
         await bricks
 
 
-async def _stop_bricks(ways: Mapping[str, Connect]) -> None:
+async def stop_bricks(ways: Mapping[str, Connect]) -> None:
     """Connect to each brick, which stops its motors, and let it go."""
     from drivers.nxt.brick import Brick
 
