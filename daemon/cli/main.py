@@ -56,6 +56,7 @@ COMMANDS: dict[Group, dict[str, str]] = {
         "run": "daemon.cli.run:run",
         "make-safe": "daemon.cli.make_safe:make_safe",
         "profile": "daemon.cli.profile:app",
+        "setup": "daemon.cli.setup:setup",
         "calibrate": "daemon.cli.calibrate:app",
         "version": "daemon.cli.version:version",
         "completion": "daemon.cli.completion:completion",

@@ -130,7 +130,9 @@ class BodyWorld(ABC):
                 continue
             step = min(max(left, -HAND_RAD_S * dt), HAND_RAD_S * dt)
             drive.follow(step / dt, dt)
-            if left != step:
+            if left == step:
+                drive.stop()
+            else:
                 self.hands[drive] = left - step
 
     def _a_demand_changes(self) -> bool:

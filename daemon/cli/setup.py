@@ -1,0 +1,109 @@
+"""``canhelm setup``: commissioning of a robot with a person beside it."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+from cyclopts.validators import Number
+
+from canhelm.aio import Client
+from canhelm.errors import ConfigError, NotReady
+from daemon.cli.motion import INTERRUPTED
+from daemon.cli.options import DEFAULT, Options
+from daemon.cli.output import say, say_warning, show
+from daemon.cli.terminal import Terminal
+
+if TYPE_CHECKING:
+    from daemon.commissioning.wheels import Findings
+    from profiles.loader import LoadedProfile
+    from profiles.schema import Profile
+
+Current = Annotated[int, Parameter(validator=Number(gte=50, lte=5000), help="Highest current meanwhile [mA].")]
+
+
+def setup(what: str = "all", /, *, current: Current = 500, options: Options = DEFAULT) -> int:
+    """Look at every wheel, pair and brake, one at a time, and put what is found into the profile's side file.
+
+    The wheels are in the air, the current is capped. Every write is shown before, and undone on Ctrl-C.
+
+    Example: `canhelm setup all`
+
+    Args:
+        what: A wheel by its drive's name or node id, `pairs` for encoders and brakes of wheel pairs, or `all`.
+    """
+    try:
+        return asyncio.run(_setup(what, current, Terminal(), options))
+    except (EOFError, KeyboardInterrupt):
+        say("broken off: the drives are as they were, and the profile, too")
+        return INTERRUPTED
+
+
+async def _setup(what: str, current_ma: int, person: Terminal, options: Options) -> int:
+    from daemon.commissioning.session import changes_of, commission
+
+    async with Client(options.socket, options.robot) as daemon:
+        loaded = profile_of(await daemon.status())
+        findings = await commission(daemon, person, loaded.profile, what, current_ma)
+    changes = changes_of(loaded.profile, findings)
+    show(_result(findings, changes), json=options.json)
+    if findings.unsolved:
+        for sentence in findings.unsolved:
+            say_warning(f"to be mended: {sentence}")
+        say("nothing was written: mend it, then begin again")
+        return 1
+    if changes:
+        await _write(loaded.path, findings, changes, person)
+    return 0
+
+
+def profile_of(status: dict[str, Any]) -> LoadedProfile:
+    """The profile that the daemon runs with, from its file.
+
+    Raises:
+        ConfigError: it has none of its own, or the file says something else by now.
+        NotReady: a node is not ready.
+    """
+    from profiles.loader import SHIPPED, load
+
+    file = status["profile_file"]
+    if file is None or Path(file).is_relative_to(SHIPPED):
+        remedy = "begin one: `canhelm profile new NAME --extends max2d --out NAME.yaml`, and run the daemon with it"
+        raise ConfigError("this robot has no profile of its own that could be changed", value=file, remedy=remedy)
+    loaded = load(file)
+    if _nodes(loaded.profile) != {node["name"]: node["node"] for node in status["nodes"] if node.get("node")}:
+        raise ConfigError(f"{file} has changed since the daemon was started", value=file, remedy="start it anew")
+    absent = [str(node["status"]) for node in status["nodes"] if node["node_state"] != "ready"]
+    if absent:
+        raise NotReady("; ".join(absent), remedy="all nodes have to be there: see `canhelm status`")
+    return loaded
+
+
+def _nodes(profile: Profile) -> dict[str, int]:
+    drives = {name: drive.node for name, drive in profile.drives.items()}
+    return drives | {name: encoder.node for name, encoder in profile.encoders.items()}
+
+
+def _result(findings: Findings, changes: dict[str, tuple[Any, Any]]) -> dict[str, Any]:
+    return {
+        "wrong": findings.wrong,
+        "unsolved": findings.unsolved,
+        "changes": {name: {"was": old, "new": new} for name, (old, new) in changes.items()},
+    }
+
+
+async def _write(path: Path, findings: Findings, changes: dict[str, tuple[Any, Any]], person: Terminal) -> None:
+    """Show what would be written, and write it where the person agrees. Raises ConfigError, EOFError."""
+    from daemon.commissioning.dialogue import agrees, preview
+    from profiles.side_file import write_values
+
+    say(f"the side file of {path} gets:")
+    for line in preview(changes):
+        say(line)
+    if await agrees(person, "write it?"):
+        side = write_values(path, findings.values)
+        say(f"written into {side}; start the daemon anew")
+    else:
+        say("nothing was written")

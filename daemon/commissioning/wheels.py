@@ -1,0 +1,171 @@
+"""One wheel at a time, in the air: which one turns, which way, and how many counts a turn has."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import msgspec
+
+from canhelm.errors import CanhelmError
+from daemon.commissioning.dialogue import Daemon, Person, number, told
+from profiles.schema import DriveConfig
+
+JOG_M_S = 0.1
+JOG_S = 2.0
+LEAST_SHARE = 0.2
+"""Share of the commanded way below which a wheel has not turned."""
+TOLERANCE = 0.015
+"""Of the counts of one turn by hand: five degrees. An encoder of 512 pulses differs from one of 500 by 0.024."""
+QUESTION = "which wheel turned, and which way? forward, backward or none; another wheel as `NAME forward`"
+Values = dict[tuple[str, ...], Any]
+
+
+@dataclass(slots=True)
+class Findings:
+    """What a commissioning has found.
+
+    Attributes:
+        wrong: what was wrong and is put right by ``values``.
+        unsolved: what a person has to mend before the robot may be driven.
+        values: of the profile, by their keys, where they differ from what it says.
+    """
+
+    wrong: list[str] = field(default_factory=list)
+    unsolved: list[str] = field(default_factory=list)
+    values: Values = field(default_factory=dict)
+
+    def put(self, part: str, name: str, found: Mapping[str, Any], config: msgspec.Struct) -> None:
+        """Note values of one drive, encoder or brake, where they differ from its profile."""
+        for key, value in found.items():
+            if value != getattr(config, key):
+                self.values[part, name, key] = value
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What was seen of one drive.
+
+    Attributes:
+        drive: the one that was commanded.
+        wheel: the one that turned; empty where none did.
+        forward: which way.
+        moved: it counted at least a part of the commanded way.
+        turn_qc: counts of one turn forward by hand.
+        pulses: of its encoder, as its label says; the profile's where the counts fit.
+        radius_m: of the wheel.
+    """
+
+    drive: str
+    wheel: str
+    forward: bool
+    moved: bool
+    turn_qc: int = 0
+    pulses: int = 0
+    radius_m: float = 0.0
+
+
+def seen_wheel(answer: str, commanded: str, wheels: Mapping[str, DriveConfig]) -> tuple[str, bool] | None:
+    """The wheel and whether it went forward, from a person's words; an empty name for none, None for no answer."""
+    words = answer.lower().split()
+    if words == ["none"]:
+        return "", False
+    *name, way = words or [""]
+    wheel = name[0] if len(name) == 1 else commanded
+    if len(name) > 1 or wheel not in wheels or way not in ("forward", "backward"):
+        return None
+    return wheel, way == "forward"
+
+
+async def look_at_wheel(daemon: Daemon, person: Person, drive: str, wheels: Mapping[str, DriveConfig]) -> Seen:
+    """Jog one drive, ask what turned, and let the person turn it once by hand. Raises CanhelmError, EOFError."""
+    config = wheels[drive]
+    speed = min(JOG_M_S, config.max_speed_m_s)
+    await person.ask(f"{drive} (node {config.node}) turns for {JOG_S:g} s as if forward; press Enter and watch")
+    before = await _position_qc(daemon, drive)
+    await daemon.call("motor.velocity", node=drive, wheel_speed_m_s=speed, duration_s=JOG_S)
+    way_m = abs(await _position_qc(daemon, drive) - before) * _m_per_qc(config)
+    moved = way_m > LEAST_SHARE * speed * JOG_S
+    while (answer := seen_wheel(await person.ask(QUESTION), drive, wheels)) is None:
+        person.tell(f"wheels are {', '.join(wheels)}; say for instance `forward`, or `{next(iter(wheels))} backward`")
+    wheel, forward = answer
+    if not wheel or not moved:
+        return Seen(drive, wheel, forward, moved)
+    before = await _position_qc(daemon, drive)
+    await person.ask(f"turn wheel {wheel} forward by hand, exactly one turn; then press Enter")
+    turn_qc = await _position_qc(daemon, drive) - before
+    fitted, pulses = wheels[wheel], wheels[wheel].encoder_pulses_per_turn
+    if turn_qc and not _fits(turn_qc, fitted, pulses):
+        person.tell(f"{abs(turn_qc)} counts a turn of {wheel}, and the profile says {_expected_qc(fitted):.0f}")
+        pulses = round(await number(person, "pulses a turn on the label of its encoder", pulses))
+    radius_m = await number(person, f"diameter of wheel {wheel} in mm", 2e3 * fitted.wheel_radius_m) / 2e3
+    return Seen(drive, wheel, forward, moved, turn_qc, pulses, radius_m)
+
+
+async def _position_qc(daemon: Daemon, drive: str) -> int:
+    return int((await daemon.call("sdo.read", node=drive, object="position_actual_value"))["value"])
+
+
+def _m_per_qc(config: DriveConfig) -> float:
+    return 2.0 * math.pi * config.wheel_radius_m / _expected_qc(config)
+
+
+def _expected_qc(config: DriveConfig) -> float:
+    return config.qc_per_motor_turn * config.total_ratio
+
+
+def _fits(turn_qc: int, config: DriveConfig, pulses: int) -> bool:
+    return math.isclose(abs(turn_qc), 4 * pulses * config.total_ratio, rel_tol=TOLERANCE)
+
+
+def judge_wheel(seen: Seen, wheels: Mapping[str, DriveConfig], findings: Findings) -> None:
+    """Put what was seen of one drive into the findings."""
+    drive, wheel, commanded = seen.drive, seen.wheel, wheels[seen.drive]
+    if not wheel:
+        why = "its encoder counts: is the shaft loose, or the wheel?" if seen.moved else "check motor cable and brake"
+        findings.unsolved.append(f"{drive} does not turn a wheel: {why}")
+        return
+    if not seen.moved or not seen.turn_qc:
+        findings.unsolved.append(f"{drive} turns, and its encoder counts nothing: check the encoder's cable")
+        return
+    direction = 1 if seen.turn_qc > 0 else -1
+    if direction != (commanded.direction if seen.forward else -commanded.direction):
+        findings.unsolved.append(f"{drive}: what was seen and what was counted by hand contradict each other: again")
+        return
+    config = wheels[wheel]
+    if wheel != drive:
+        findings.wrong.append(f"swapped: drive {drive} (node {commanded.node}) turns wheel {wheel}")
+    if direction != commanded.direction:
+        findings.wrong.append(f"reversed: {wheel} rolls backward when it shall roll forward")
+    found = {"node": commanded.node, "direction": direction, "encoder_pulses_per_turn": seen.pulses}
+    if seen.pulses != config.encoder_pulses_per_turn:
+        pulses = config.encoder_pulses_per_turn
+        findings.wrong.append(f"counts: {wheel} has an encoder of {seen.pulses} pulses, not {pulses}")
+    if not _fits(seen.turn_qc, config, seen.pulses):
+        ratio = abs(seen.turn_qc) / (4 * seen.pulses)
+        findings.wrong.append(f"gear: {wheel} has {ratio:.4g} motor turns a wheel turn, not {config.total_ratio:.4g}")
+        findings.values["drives", wheel, "belt_ratio"] = round(ratio / config.gear_ratio, 4)
+    if not math.isclose(seen.radius_m, config.wheel_radius_m, rel_tol=1e-4):
+        sizes = f"{seen.radius_m * 1e3:.4g} mm, not {config.wheel_radius_m * 1e3:.4g} mm"
+        findings.wrong.append(f"radius: {wheel} has {sizes}")
+        findings.values["drives", wheel, "wheel_radius_m"] = round(seen.radius_m, 6)
+    findings.put("drives", wheel, found, config)
+
+
+async def look_at_wheels(
+    daemon: Daemon, person: Person, chosen: list[str], wheels: Mapping[str, DriveConfig], findings: Findings
+) -> None:
+    """One drive after the other; a drive that fails is told, and the next one follows. Raises EOFError."""
+    turned: dict[str, str] = {}
+    for drive in chosen:
+        try:
+            seen = await look_at_wheel(daemon, person, drive, wheels)
+        except CanhelmError as error:
+            findings.unsolved.append(f"{drive}: {told(error)}")
+            await daemon.call("reset")
+            continue
+        if seen.wheel and turned.setdefault(seen.wheel, drive) != drive:
+            findings.unsolved.append(f"wheel {seen.wheel} was seen twice, with {turned[seen.wheel]} and {drive}: again")
+        judge_wheel(seen, wheels, findings)

@@ -1,0 +1,81 @@
+"""A person who commissions a simulated robot: pushes and turns what is asked for, looks, and says what is seen."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+Call = Callable[..., Awaitable[dict[str, Any]]]
+SEEN_DEG = 5.0
+MOMENT_S = 0.1
+
+
+class WorkshopPerson:
+    """Answers the questions of ``canhelm setup`` by what the simulated robot shows.
+
+    Args:
+        call: a method of the daemon's API.
+        labels: pulses on the labels of encoders that are not as the profile says, by wheel.
+        diameters: of wheels [mm] that are not as the profile says.
+    """
+
+    def __init__(
+        self, call: Call, labels: dict[str, int] | None = None, diameters: dict[str, float] | None = None
+    ) -> None:
+        self.heard: list[str] = []
+        self._call = call
+        self.labels = labels or {}
+        self.diameters = diameters or {}
+        self._before: dict[str, float] = {}
+        self._wheel = ""
+
+    def tell(self, text: str) -> None:
+        """Hear something."""
+        self.heard.append(text)
+
+    async def ask(self, question: str) -> str:
+        """The answer."""
+        self.heard.append(question)
+        if question.startswith("which wheel"):
+            return await self._what_turned()
+        if question.startswith("turn wheel"):
+            return await self._turn_once(question.split()[2])
+        if pushed := re.match(r"push the (\w+) pair", question):
+            given = await self._call("simulation.hand", name=pushed[1], angle_deg=20.0)
+            await asyncio.sleep(MOMENT_S)
+            return "y" if given["turned_deg"] else "n"
+        if back := re.match(r"turn the (\w+) pair back", question):
+            await self._call("simulation.hand", name=back[1], angle_deg=-20.0)
+            await asyncio.sleep(MOMENT_S)
+        elif question.startswith("pulses"):
+            return str(self.labels.get(self._wheel, ""))
+        elif question.startswith("diameter"):
+            return str(self.diameters.get(self._wheel, ""))
+        elif question.endswith("[y/n]"):
+            return "y"
+        elif "press Enter and watch" in question:
+            self._before = (await self._call("simulation.look"))["wheel_deg"]
+        return ""
+
+    async def _what_turned(self) -> str:
+        now = (await self._call("simulation.look"))["wheel_deg"]
+        turned = {name: angle - self._before[name] for name, angle in now.items()}
+        name = max(turned, key=lambda wheel: abs(turned[wheel]))
+        if abs(turned[name]) < SEEN_DEG:
+            return "none"
+        return f"{name} {'forward' if turned[name] > 0 else 'backward'}"
+
+    async def _turn_once(self, wheel: str) -> str:
+        self._wheel = wheel
+        await self._call("simulation.hand", name=wheel, angle_deg=360.0)
+        await self._rests()
+        return ""
+
+    async def _rests(self) -> None:
+        """Wait until the hand has done its turn: as long as something moves."""
+        before: dict[str, float] = {}
+        while (now := (await self._call("simulation.look"))["wheel_deg"]) != before:
+            before = now
+            await asyncio.sleep(MOMENT_S)
