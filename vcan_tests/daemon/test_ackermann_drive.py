@@ -76,4 +76,4 @@ def test_an_arc_is_as_long_as_asked_and_begins_when_steered(steering: float, spe
         car.move(command.wheel_speed_m_s)
         if record.done:
             break
-    assert driven == pytest.approx(way, abs=1e-6)
+    assert driven == pytest.approx(way, abs=1e-4)

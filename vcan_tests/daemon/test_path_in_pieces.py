@@ -48,7 +48,7 @@ def sampled(piece: Piece, begin: float, end: float, count: int = 400) -> np.ndar
 
 def nearest(points: np.ndarray, driven: Piece) -> np.ndarray:
     """Distance of each point from a driven piece, by brute force."""
-    others = sampled(driven, 0.0, driven.length_m, 800)
+    others = sampled(driven, 0.0, driven.length_m, 100 + int(500 * driven.length_m))
     gaps = points[:, None, :] - others[None, :, :]
     return np.asarray(np.sqrt((gaps**2).sum(axis=2).min(axis=1)))
 
