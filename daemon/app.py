@@ -14,6 +14,7 @@ from canhelm.errors import BusOff
 from daemon.runtime.clock import VirtualTimeLoop
 from daemon.runtime.commands import Commands
 from daemon.runtime.cycle import Cycle
+from daemon.runtime.localising import Localiser
 from daemon.runtime.recorder import CandumpRecorder
 from daemon.runtime.service import Service
 from daemon.runtime.supervisor import Supervisor
@@ -102,8 +103,20 @@ class App:
         workshop = Workshop(built or profile, self.network) if self.network else None
         commands = Commands(self.supervisor, self.network, workshop)
         self.service = Service(profile.name, self.supervisor, commands, self.bus, self.cycle, profile_file)
+        self._localise(commands)
         self.server = self._serve(socket) if socket else None
         self.gateway = self._serve_tools(gateway) if gateway else None
+
+    def _localise(self, commands: Commands) -> None:
+        """Correct the vehicle's odometry by bearings, where its profile has reflectors."""
+        if self.profile.localisation is None:
+            return
+        localiser = Localiser(self.profile.localisation, self.vehicle, self.supervisor.log)
+        self.supervisor.observers.append(localiser.step)
+        commands.handlers |= localiser.handlers
+        self.service.localiser = localiser
+        if self.network is not None and self.network.scanner is not None:
+            self.network.scanner.on_scan = localiser.take
 
     def _serve(self, socket: Path) -> Server:
         from daemon.api.server import Server
@@ -141,6 +154,8 @@ class App:
             self.service.recorder = self.recorder
         if self.network is not None and self._powered:
             self.network.power_on("all")
+        if self.network is not None and self.network.scanner is not None:
+            self.network.scanner.start()
         if await self._opens_bus():
             self.devices.start()
         else:

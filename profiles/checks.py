@@ -90,6 +90,7 @@ def findings(data: dict[str, Any], complete: bool = True) -> Iterator[Finding]:
     yield from _accelerometer(data)
     yield from _traction(data)
     yield from _encoders(data)
+    yield from _localisation(data)
     yield from _factory(data)
     yield from _unused(data)
 
@@ -262,6 +263,17 @@ def _factory(data: dict[str, Any]) -> Iterator[Finding]:
     for index, name in enumerate(given if isinstance(given, list) else ()):
         if drives is not None and name not in drives:
             yield _unknown(("simulation", "factory", index), "drives", name, drives)
+
+
+def _localisation(data: dict[str, Any]) -> Iterator[Finding]:
+    kind = part(data, "vehicle").get("type")
+    if part(data, "localisation") and kind in (None, "omni"):
+        yield Finding(("localisation",), "has no vehicle with an odometry to correct", "leave it out")
+    if part(part(data, "localisation"), "scanner").get("on") == "trailer" and kind != "semitrailer":
+        yield Finding(("localisation", "scanner", "on"), "there is no trailer", "write on: vehicle")
+    if part(part(data, "simulation"), "scanner") and not part(data, "localisation"):
+        what = "sees no reflectors: there is no localisation"
+        yield Finding(("simulation", "scanner"), what, "write localisation: with reflectors")
 
 
 def _unused(data: dict[str, Any]) -> Iterator[Finding]:

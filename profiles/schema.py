@@ -16,6 +16,7 @@ from msgspec import Meta, field
 
 from profiles.bricks import BrickConfig, DifferentialGeometry, NxtMotorConfig
 from profiles.parts import Name, NotNegative, Part, Positive
+from profiles.localisation import LocalisationConfig, SimulatedScannerConfig
 from profiles.sensors import AngleCalibration, SensorDefects
 from profiles.steered import CarGeometry, SemitrailerGeometry
 
@@ -341,6 +342,8 @@ class SimulationConfig(Part, frozen=True, kw_only=True):
     """Patches of another friction than the tyre's, the last one on top."""
     sensors: dict[Name, SensorDefects] = field(default_factory=dict)
     """By the names of their encoders; the others are without fault."""
+    scanner: SimulatedScannerConfig | None = None
+    """Sees the reflectors of `localisation`; None: some program sends bearings."""
     factory: tuple[Name, ...] = ()
     """Drives that are as they left the factory: node id 1, nothing set up."""
 
@@ -363,6 +366,8 @@ class Profile(Part, frozen=True, kw_only=True):
     accelerometer: AccelerometerConfig | None = None
     vehicle: Geometry | None = None
     limits: Limits
+    localisation: LocalisationConfig | None = None
+    """None: the pose is that of the odometry alone."""
     traction: TractionConfig | None = None
     """None: slip of the wheels is not answered."""
     simulation: SimulationConfig | None = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from daemon.api.localisation_methods import LOCALISATION_METHODS
 from daemon.api.nxt_methods import NXT_METHODS
 from daemon.api.parameters import REQUIRED, Method, Param, Role
 from daemon.api.simulation_methods import SIMULATION_METHODS
@@ -35,7 +36,7 @@ _TALK = (
         "status",
         "State at a glance.",
         (),
-        "state, message, nodes, brakes, vehicle, bus, cycle, recording, events",
+        "state, message, nodes, brakes, vehicle, localisation, bus, cycle, recording, events",
         Role.WATCH,
     ),
     Method(
@@ -365,7 +366,7 @@ _CONFIG = (
 
 METHODS: dict[str, Method] = {
     method.name: method
-    for method in (*_TALK, *_WHOLE, *_MOTOR, *_VEHICLE, *_NETWORK, *_NODES, *_CONFIG, *NXT_METHODS, *SIMULATION_METHODS)
+    for method in (*_TALK, *_WHOLE, *_MOTOR, *_VEHICLE, *_NETWORK, *_NODES, *_CONFIG, *NXT_METHODS, *LOCALISATION_METHODS, *SIMULATION_METHODS)
 }
 
 NOTIFICATIONS = {

@@ -10,6 +10,7 @@ from typing import Any
 
 from daemon.runtime.commands import Commands
 from daemon.runtime.cycle import Cycle
+from daemon.runtime.localising import Localiser
 from daemon.runtime.recorder import CandumpRecorder
 from daemon.runtime.supervisor import Supervisor
 from drivers.bus.contract import Bus
@@ -30,6 +31,7 @@ class Service:
 
     Attributes:
         recorder: of every frame; None where nothing is recorded.
+        localiser: of the vehicle; None where its pose is the odometry's.
         found: what a first look at a bus without a profile has found.
     """
 
@@ -44,6 +46,7 @@ class Service:
     ) -> None:
         self.robot = robot
         self.recorder: CandumpRecorder | None = None
+        self.localiser: Localiser | None = None
         self.found: list[dict[str, Any]] = []
         self.call = commands.call
         self.open_lease = supervisor.open_lease
@@ -89,6 +92,7 @@ class Service:
             "brakes": [brake.status() for brake in supervisor.devices.brakes.values()],
             "vehicle": supervisor.vehicle.status(),
             "found": self.found,
+            "localisation": self.localiser.status() if self.localiser else None,
             "limits_active": list(supervisor.active_limits),
             "motions": [motion.summary() for motion in supervisor.motions.values()],
             "bus": self._bus_status(),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from functools import partial
+from math import cos, radians, sin
 from random import Random
 
 import msgspec
@@ -19,6 +20,7 @@ from drivers.simulated.max2d import Max2dWorld
 from drivers.simulated.node import SimulatedNode
 from drivers.simulated.nxt_link import SimulatedBrick, simulated_brick
 from drivers.simulated.omni import OmniWorld
+from drivers.simulated.scanner import SimulatedScanner
 from drivers.simulated.semitrailer import SemitrailerWorld
 from drivers.simulated.stand import StandWorld
 from profiles.bricks import DifferentialGeometry
@@ -62,6 +64,7 @@ class SimulatedNetwork:
         world: the truth, for tests.
         stand: the drives that move nothing of the vehicle.
         drives, bricks, encoders, brakes: the twins by their names in the profile.
+        scanner: what sees the reflectors; None where the profile has none.
 
     Raises:
         ConfigError: the profile cannot be simulated.
@@ -108,12 +111,30 @@ class SimulatedNetwork:
         for name, config in profile.drives.items():
             if config.emergency_stop:
                 self.drives[name].set_digital_input(config.emergency_stop.input, config.emergency_stop.pressed == "low")
+        self.scanner = self._make_scanner(profile, seed)
         self._watch: asyncio.TimerHandle | None = None
         for drive in self.drives.values():
             drive.on_power_stage = self._on_power_stage
 
     def _world_of(self, drive: str) -> BodyWorld:
         return self.world if drive in self.world.axes else self.stand
+
+    def _make_scanner(self, profile: Profile, seed: int) -> SimulatedScanner | None:
+        simulation, localisation = profile.simulation, profile.localisation
+        if localisation is None or simulation is None or simulation.scanner is None:
+            return None
+        places = {name: (mark.x_m, mark.y_m) for name, mark in localisation.reflectors.items()}
+        mounted = localisation.scanner
+
+        def look(now_s: float) -> tuple[float, float, float]:
+            self.world.advance(now_s)
+            world, towed = self.world, mounted.on == "trailer"
+            x, y, yaw = world.trailer_pose if towed and isinstance(world, SemitrailerWorld) else world.pose
+            ahead, left = mounted.x_m, mounted.y_m
+            place = (x + ahead * cos(yaw) - left * sin(yaw), y + ahead * sin(yaw) + left * cos(yaw))
+            return (*place, yaw + radians(mounted.rotation_deg))
+
+        return SimulatedScanner(simulation.scanner, places, look, f"{seed} scanner")
 
     def _brake(self, name: str, config: BrakeConfig) -> SimulatedBrake:
         brake = SimulatedBrake(config, partial(self._move_brake, name))
@@ -165,6 +186,8 @@ class SimulatedNetwork:
     async def close(self) -> None:
         """Switch everything off and leave the bus."""
         self.power_off()
+        if self.scanner is not None:
+            self.scanner.close()
         for node in self._nodes("all"):
             await node.port.close()
         for brick in self.bricks.values():
