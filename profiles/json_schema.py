@@ -12,7 +12,7 @@ from typing import Any
 
 import msgspec
 
-from profiles import bricks, schema
+from profiles import bricks, localisation, schema, sensors, steered
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _NAME = {"type": "string"}
@@ -51,7 +51,7 @@ def _allow_extends(node: Any) -> None:
 
 def _descriptions() -> dict[str, dict[str, str]]:
     """Docstring of every field, by class and field."""
-    trees = [ast.parse(inspect.getsource(module)) for module in (schema, bricks)]
+    trees = [ast.parse(inspect.getsource(module)) for module in (schema, bricks, steered, sensors, localisation)]
     classes = [node for tree in trees for node in tree.body if isinstance(node, ast.ClassDef)]
     return {node.name: _field_descriptions(node) for node in classes}
 

@@ -29,7 +29,14 @@ def broken(tmp_path: Path) -> Path:
 
 
 def test_list_shows_the_shipped_robots(capsys: Captured) -> None:
-    assert [row["name"] for row in rows(capsys, "list")] == ["ackermann", "max2d", "nxt", "semitrailer", "semitrailer_lab", "turtle"]
+    assert [row["name"] for row in rows(capsys, "list")] == [
+        "ackermann",
+        "max2d",
+        "nxt",
+        "semitrailer",
+        "semitrailer_lab",
+        "turtle",
+    ]
 
 
 def test_show_gives_what_the_robots_own_file_says(capsys: Captured) -> None:

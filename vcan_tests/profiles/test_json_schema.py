@@ -37,3 +37,11 @@ def test_a_node_id_has_its_range(definitions: dict[str, Any]) -> None:
 
 def test_an_unknown_key_is_refused(definitions: dict[str, Any]) -> None:
     assert definitions["Limits"]["additionalProperties"] is False
+
+
+@pytest.mark.parametrize(
+    ("part", "field"),
+    [("SensorDefects", "hysteresis_deg"), ("LocalisationConfig", "way_noise_m"), ("SteeredAxle", "drive")],
+)
+def test_parts_from_files_of_their_own_are_described_too(part: str, field: str) -> None:
+    assert json_schema()["$defs"][part]["properties"][field]["description"]
