@@ -1,0 +1,89 @@
+"""``canhelm setup`` at a terminal, beside a simulated robot that is wired wrong."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from daemon.cli.main import main
+from profiles.loader import load
+from vcan_tests.daemon.test_calibration import Person
+from vcan_tests.daemon.test_processes import PATIENT_PROFILE, Bench
+from vcan_tests.daemon.workshop_person import WorkshopPerson
+
+ENDS = (" [y/n] ", "Enter and watch ", "NAME forward` ", "then press Enter ", "100] ", "200] ")
+BUILT = PATIENT_PROFILE + "drives: {rear_left: {direction: -1}}\n"
+
+
+@pytest.fixture
+def miswired(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
+    """A daemon on a simulated robot whose rear left wheel is reversed, on blocks."""
+    built = tmp_path / "built.yaml"
+    built.write_text(BUILT)
+    monkeypatch.setenv("CANHELM_MISWIRE", str(built))
+    bench = Bench(tmp_path, profile_text=f"{PATIENT_PROFILE}setup: needed\n")
+    bench.client.call("simulation.lift", lifted=True)
+    yield bench
+    bench.client.close()
+    bench.process.kill()
+    bench.process.wait()
+
+
+def eyes_on(bench: Bench) -> WorkshopPerson:
+    """Somebody who sees and turns what the daemon simulates."""
+
+    async def call(method: str, **params: Any) -> dict[str, Any]:
+        return bench.client.call(method, **params)
+
+    return WorkshopPerson(call)
+
+
+@pytest.mark.real_time
+def test_a_reversed_wheel_is_found_and_written(miswired: Bench, tmp_path: Path) -> None:
+    person, eyes = Person(miswired, ["setup", "rear_left", "--json"]), eyes_on(miswired)
+    asked = person.reads_until(*ENDS)
+    while "write it?" not in asked:
+        person.types(asyncio.run(eyes.ask(asked.splitlines()[-1].strip())))
+        asked = person.reads_until(*ENDS)
+    assert "drives.rear_left.direction: 1 -> -1" in asked
+    person.types("y")
+    told = json.loads(person.process.communicate(timeout=60)[0])
+    assert person.process.returncode == 0
+    assert told["wrong"] == ["reversed: rear_left rolls backward when it shall roll forward"]
+    assert load(tmp_path / "max2d.yaml").profile.drives["rear_left"].direction == -1
+
+
+@pytest.mark.real_time
+def test_ctrl_c_leaves_everything_as_it_was(miswired: Bench, tmp_path: Path) -> None:
+    person = Person(miswired, ["setup", "rear_left"])
+    for _ in range(2):
+        person.reads_until(" [y/n] ")
+        person.types("y")
+    person.reads_until("Enter and watch ")
+    assert limit_ma(miswired) == 500
+    person.types("")
+    miswired.wait_for(lambda status: status["state"] == "active")
+    os.kill(person.process.pid, signal.SIGINT)
+    person.reads_until("broken off: the drives are as they were")
+    person.process.communicate(timeout=30)
+    assert person.process.returncode == 130
+    assert limit_ma(miswired) == 5000
+    assert miswired.status()["state"] == "idle"
+    assert not (tmp_path / "max2d.calibration.yaml").exists()
+
+
+def limit_ma(bench: Bench) -> int:
+    """The output current limit of the rear left drive."""
+    return int(bench.client.call("sdo.read", node="rear_left", object="output_current_limit")["value"])
+
+
+def test_without_a_terminal_nobody_is_asked(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["setup", "--socket", "/nonexistent"]) == 2
+    assert "nobody is there to answer" in capsys.readouterr().err
