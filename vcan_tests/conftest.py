@@ -14,6 +14,7 @@ import pytest
 
 from daemon.runtime.clock import VirtualTimeLoop
 from vcan_tests.awake import awake_processors
+from vcan_tests.kernel.guest import COMMAND_IN_GUEST, RUNNING_SYSTEMD
 
 hypothesis.settings.register_profile("canhelm", deadline=None)
 hypothesis.settings.load_profile("canhelm")
@@ -21,13 +22,12 @@ hypothesis.settings.load_profile("canhelm")
 for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
     signal.signal(number, handler)  # nohup and shells in the background have them ignored, and processes inherit that
 
-GUEST = Path("/run/guest/command")
-if not GUEST.exists():
+if not COMMAND_IN_GUEST.exists():
     os.environ["CANHELM_ROBOTS"] = "/nonexistent"  # the robots of whoever runs the tests are not those that are tested
 
 NEEDS = {
     "vcan": [Path("/sys/class/net/vcan0"), Path("/sys/class/net/vcan1")],
-    "systemd": [Path("/run/systemd/system"), GUEST],
+    "systemd": [RUNNING_SYSTEMD, COMMAND_IN_GUEST],
 }
 
 

@@ -24,8 +24,8 @@ from vcan_tests.kernel.processes import run_to_end
 TIMED_OUT = 124
 NO_STATUS = 125
 SCRIPTS = Path(__file__).parent
-SYSTEMD_GUEST = (Path("/run/systemd/system"), Path("/run/guest/command"))
-"""What is there in a guest with a systemd, and together nowhere else."""
+RUNNING_SYSTEMD, COMMAND_IN_GUEST = Path("/run/systemd/system"), Path("/run/guest/command")
+"""What is there under a systemd, and in a guest."""
 PASSED_ON = ("HOME", "LANG", "LC_ALL", "LOGNAME", "PYTEST_ADDOPTS", "USER")
 
 
@@ -71,7 +71,7 @@ def run_in_guest(
 
 def is_guest() -> bool:
     """Whether this process runs in a guest, under a systemd that is not this machine's."""
-    return all(path.exists() for path in SYSTEMD_GUEST)
+    return RUNNING_SYSTEMD.exists() and COMMAND_IN_GUEST.exists()
 
 
 @contextmanager
