@@ -11,11 +11,13 @@ from socket import socket as Socket
 from typing import TYPE_CHECKING
 
 from canhelm.errors import BusOff
+from daemon.runs.store import RunStore
 from daemon.runtime.clock import VirtualTimeLoop
 from daemon.runtime.commands import Commands
 from daemon.runtime.cycle import Cycle
 from daemon.runtime.localising import Localiser
 from daemon.runtime.recorder import CandumpRecorder
+from daemon.runtime.run_recorder import RunRecorder
 from daemon.runtime.service import Service
 from daemon.runtime.supervisor import Supervisor
 from daemon.runtime.vehicles import make_vehicle
@@ -63,6 +65,7 @@ class App:
         gateway: where other CANopen tools are served; None for nowhere.
         built: how the simulated robot is really built and wired; None: as its profile says.
         profile_file: where the profile stands, for commands that change it; None for nowhere.
+        runs: where each motion leaves a run; None for nowhere.
         inherited: sockets that listen already, by their paths; the service manager has opened them and takes them away.
     """
 
@@ -79,6 +82,7 @@ class App:
         inherited: Mapping[Path, Socket] | None = None,
         built: Profile | None = None,
         profile_file: Path | None = None,
+        runs: RunStore | None = None,
     ) -> None:
         self.spec = bus
         self.wire = wire = make_wire(bus, profile, seed, built)
@@ -103,6 +107,7 @@ class App:
         workshop = Workshop(built or profile, self.network) if self.network else None
         commands = Commands(self.supervisor, self.network, workshop)
         self.service = Service(profile.name, self.supervisor, commands, self.bus, self.cycle, profile_file)
+        self.service.runs = RunRecorder(runs, self.supervisor, self.bus, profile, bus) if runs else None
         self._localise(commands)
         self.server = self._serve(socket) if socket else None
         self.gateway = self._serve_tools(gateway) if gateway else None
@@ -152,6 +157,8 @@ class App:
             self.recorder = CandumpRecorder(self.bus, self._record, self.profile.name, virtual=virtual)
             self.recorder.start()
             self.service.recorder = self.recorder
+        if self.service.runs is not None:
+            self.service.runs.start()
         if self.network is not None and self._powered:
             self.network.power_on("all")
         if self.network is not None and self.network.scanner is not None:
@@ -197,6 +204,8 @@ class App:
             await self.network.close()
         if self.server is not None:
             await self.server.close()
+        if self.service.runs is not None:
+            self.service.runs.close()
         if self.recorder is not None:
             self.recorder.close()
         return doubtful

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from daemon.app import App
+from daemon.runs.store import RunStore
 from drivers.simulated.network import SimulatedNetwork
 from profiles.loader import load
 from profiles.schema import Profile
@@ -100,6 +101,7 @@ async def running_robot(
     bus: str = "simulated",
     seed: int = 1,
     record: Path | None = None,
+    runs: RunStore | None = None,
     powered: bool = True,
     booted: bool = True,
     expect_errors: bool = False,
@@ -113,7 +115,7 @@ async def running_robot(
     """
     handler = _Collector()
     logging.getLogger().addHandler(handler)
-    app = App(profile or load("max2d").profile, bus, seed=seed, record=record, powered=powered)
+    app = App(profile or load("max2d").profile, bus, seed=seed, record=record, powered=powered, runs=runs)
     robot = Robot(app)
     before = asyncio.all_tasks()
     await app.start()

@@ -15,6 +15,7 @@ Handler = Callable[[Params, str | None], Awaitable[dict[str, Any]]]
 
 async def run_motion(supervisor: Supervisor, motion: Motion, params: Params) -> dict[str, Any]:
     """Admit a motion; return its result when it is over, or its id at once where the caller does not wait."""
+    motion.asked = params
     supervisor.admit(motion)
     if motion.streaming or not params.get("wait", True):
         return {"motion": motion.identity}

@@ -27,8 +27,11 @@ class Motion(ABC):
         identity: number by which clients name it.
         ended: holds the result, or the error that ended it.
         closed: set when its drives are at rest and as it found them.
+        asked: parameters that it was asked for with.
+        record: terms of its law's last step; None before the first, and where it has no law.
     """
 
+    record: object | None = None
     streaming = False
     """True for a motion whose caller does not wait for it but goes on with new values."""
 
@@ -40,6 +43,7 @@ class Motion(ABC):
         self.running = False
         self.stop_reason = ""
         self.begun_s = 0.0
+        self.asked: dict[str, Any] = {}
         self.ended: asyncio.Future[dict[str, Any]] = asyncio.get_running_loop().create_future()
         self.ended.add_done_callback(_observe)
         self.closed = asyncio.Event()

@@ -22,6 +22,9 @@ class PairedSteerMotion(Motion):
     Args:
         law: a law of its own, at rest.
         target: what to do; None: come to rest.
+
+    Attributes:
+        record: of the last step; None before the first.
     """
 
     def __init__(
@@ -35,15 +38,17 @@ class PairedSteerMotion(Motion):
         super().__init__(kind, drives, lease)
         self._law = law
         self._target = target
-        self._record: PairedSteerRecord | None = None
+        self.record: PairedSteerRecord | None = None
+        self._driven: PairedSteerRecord | None = None
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """One step of the law; without a target it brings the robot to rest and engages the brakes."""
         if self.stop_reason:
             self._target = None
         command, record = self._law.step(measurement, self._target, dt_s)
+        self.record = record
         if self._target is not None:
-            self._record = record
+            self._driven = record
         if record.failure:
             self.fail(DeviceFault(f"{self.kind}: {record.failure}", remedy="`canhelm status` shows drives and brakes"))
         elif record.done:
@@ -55,8 +60,8 @@ class PairedSteerMotion(Motion):
         self.finish(self._result(now_s))
 
     def _result(self, now_s: float) -> dict[str, Any]:
-        error = max((abs(value) for value in self._record.heading_error_rad), default=0.0) if self._record else 0.0
-        warnings = list(self._record.warnings) if self._record else []
+        error = max((abs(value) for value in self._driven.heading_error_rad), default=0.0) if self._driven else 0.0
+        warnings = list(self._driven.warnings) if self._driven else []
         return {
             "steering_error_deg": round(math.degrees(error), 4),
             "duration_s": round(now_s - self.begun_s, 3),
@@ -65,7 +70,7 @@ class PairedSteerMotion(Motion):
 
     def progress(self) -> dict[str, Any]:
         """Phase, headings still to turn, speed, way to go, curve and mismatch angles."""
-        record = self._record
+        record = self._driven
         if record is None:
             return {"phase": "enabling"}
         return {
@@ -110,7 +115,8 @@ class StreamMotion(PairedSteerMotion):
             self.stop("no new value came")
         if self.stop_reason or self._target is not None:
             return super().step(measurement, dt_s)
-        return self._law.step(measurement, None, dt_s)[0]
+        command, self.record = self._law.step(measurement, None, dt_s)
+        return command
 
     def progress(self) -> dict[str, Any]:
         """As of any motion, and the age of the last value."""

@@ -12,6 +12,7 @@ from daemon.runtime.commands import Commands
 from daemon.runtime.cycle import Cycle
 from daemon.runtime.localising import Localiser
 from daemon.runtime.recorder import CandumpRecorder
+from daemon.runtime.run_recorder import RunRecorder
 from daemon.runtime.supervisor import Supervisor
 from drivers.bus.contract import Bus
 
@@ -31,6 +32,7 @@ class Service:
 
     Attributes:
         recorder: of every frame; None where nothing is recorded.
+        runs: of every motion; None where they are not kept.
         localiser: of the vehicle; None where its pose is the odometry's.
         found: what a first look at a bus without a profile has found.
     """
@@ -46,6 +48,7 @@ class Service:
     ) -> None:
         self.robot = robot
         self.recorder: CandumpRecorder | None = None
+        self.runs: RunRecorder | None = None
         self.localiser: Localiser | None = None
         self.found: list[dict[str, Any]] = []
         self.call = commands.call
@@ -98,6 +101,7 @@ class Service:
             "bus": self._bus_status(),
             "cycle": self._cycle_status(),
             "recording": self.recorder.status() if self.recorder else None,
+            "runs": self.runs.status() if self.runs else None,
             "events": supervisor.log.last(EVENTS_SHOWN),
         }
 

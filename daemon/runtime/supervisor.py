@@ -40,6 +40,8 @@ class Supervisor:
 
     Attributes:
         bus_missing: why the bus could not be opened yet; empty once it is.
+        observers: called at the end of each control cycle.
+        on_motion: called with each motion that was admitted, before it moves anything.
         remark: what is waited for where the profile has no device.
         stop, estop, fault, power_off, until_rest: those of :class:`daemon.runtime.stopping.Stopping`.
     """
@@ -59,6 +61,7 @@ class Supervisor:
         self.bus_missing = ""
         self.remark = ""
         self.observers: list[Callable[[], None]] = []
+        self.on_motion: list[Callable[[Motion], None]] = []
         self._stale_s = master.network.late_after_cycles * period_s
         self._numbers = itertools.count(1)
         self._tasks = TaskSet(self._on_task_failure)
@@ -157,6 +160,8 @@ class Supervisor:
         motion.identity = str(next(self._numbers))
         self.motions[motion.identity] = motion
         LOGGER.info("motion %s (%s) begins, %s", motion.identity, motion.kind, self._holder(motion))
+        for told in self.on_motion:
+            told(motion)
         self._tasks.spawn(self._carry_out(motion), MOTION)
 
     def _holder(self, motion: Motion) -> str:

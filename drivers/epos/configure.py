@@ -7,6 +7,7 @@ import asyncio
 from canhelm.errors import Refused
 from drivers.canopen.configuration import Configuration
 from drivers.canopen.device import Step
+from drivers.canopen.objects import ObjectDef
 from drivers.canopen.pdo import Settings
 from drivers.canopen.sdo import SdoClient
 from drivers.epos.codec import DRIVING_MODES
@@ -60,6 +61,13 @@ class EposSetup:
         self._outputs = outputs
         self._stop_input = stop_input
         self._written = Configuration(sdo, who)
+        self._firmware = 0
+
+    @property
+    def confirmed(self) -> dict[ObjectDef, int]:
+        """What the drive has been read to have, once all steps are done."""
+        start_up = dict(start_up_plan(self._config))
+        return {OBJECTS["software_version"]: self._firmware} | start_up | self._written.written
 
     def steps(self) -> tuple[Step, ...]:
         """The steps in their order."""
@@ -81,7 +89,7 @@ class EposSetup:
         await expect(OBJECTS["device_type"], DEVICE_TYPE, other)
         await expect(OBJECTS["vendor_id"], VENDOR_MAXON, other)
         await expect(OBJECTS["hardware_version"], HARDWARE_24_5, other, HARDWARE_MASK)
-        firmware = await self._sdo.read_int(OBJECTS["software_version"])
+        self._firmware = firmware = await self._sdo.read_int(OBJECTS["software_version"])
         if firmware < OLDEST_FIRMWARE:
             raise Refused(
                 f"{self._who}: 0x2003/1 (software_version) is 0x{firmware:04X}, not 0x{OLDEST_FIRMWARE:04X} or later",

@@ -10,6 +10,7 @@ from typing import Any
 from canhelm.errors import CanhelmError, DeviceFault, NotReady, Refused
 from drivers.canopen.device import CanopenDevice, Step
 from drivers.canopen.master import Master
+from drivers.canopen.objects import ObjectDef
 from drivers.canopen.pdo import rpdo_cob_id, tpdo_cob_id
 from drivers.contract import DriveState, Fault, NodeState
 from drivers.epos import device_control, moves
@@ -68,6 +69,7 @@ class EposDrive(CanopenDevice):
         self.on_ready_change: list[Callable[[bool], None]] = []
         self._units = WheelUnits.of(config)
         self._travel = Travel(self._units, config.max_speed_m_s)
+        self._setup: EposSetup | None = None
         self._target_rpm = 0
         self._controlword = int(Command.DISABLE_VOLTAGE)
         self._rpdo1, self._rpdo3 = rpdo_cob_id(1, config.node), rpdo_cob_id(3, config.node)
@@ -299,7 +301,13 @@ class EposDrive(CanopenDevice):
 
     def boot_steps(self) -> tuple[Step, ...]:
         """Configuration in pre-operational; see :class:`drivers.epos.configure.EposSetup`."""
-        return EposSetup(self.config, self.master.network, self.sdo, self.who, self.outputs, self._stop_input).steps()
+        self._setup = EposSetup(self.config, self.master.network, self.sdo, self.who, self.outputs, self._stop_input)
+        return self._setup.steps()
+
+    @property
+    def confirmed(self) -> dict[ObjectDef, int]:
+        """What its last configuration has read back; empty unless it is ready."""
+        return self._setup.confirmed if self._setup and self.node_state is NodeState.READY else {}
 
     def start_steps(self) -> tuple[Step, ...]:
         """Its first reading proves that PDO mapping and SYNC work."""

@@ -1,0 +1,192 @@
+"""Where runs are kept: a folder of numbered folders, one a motion, the oldest deleted when there is no room."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from canhelm.errors import CanhelmError, ConfigError, UsageError
+
+SYSTEM_FOLDER = Path("/var/lib/canhelm")
+"""Where the service manager keeps the state of robots' services (StateDirectory= of canhelm@.service)."""
+RUNS = "runs"
+FACTS, PROFILE, DRIVES = "run.yaml", "profile.yaml", "drives.yaml"
+CYCLES, TERMS, FRAMES = "cycles.csv", "terms.jsonl", "frames.log"
+LIMIT_BYTES = 200_000_000
+"""What all runs of a robot may take, unless told otherwise."""
+RESERVE_BYTES = 50_000_000
+"""What runs leave free on their disk for everything else."""
+LAST = "last"
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One run that was kept.
+
+    Attributes:
+        number: by which people name it.
+        folder: with its files.
+        facts: of :data:`FACTS`; empty where that file is missing or damaged.
+    """
+
+    number: int
+    folder: Path
+    facts: Mapping[str, Any]
+
+    @property
+    def robot(self) -> str:
+        """Whose run it is."""
+        return str(self.facts.get("robot", ""))
+
+    @property
+    def begun(self) -> str:
+        """When it began, in UTC; sorts by time."""
+        return str(self.facts.get("begun", ""))
+
+    @property
+    def size_bytes(self) -> int:
+        """What its files take."""
+        return size_of(self.folder)
+
+
+class RunStore:
+    """The runs of one folder.
+
+    Args:
+        folder: need not be there yet.
+        limit_bytes: what all runs may take.
+    """
+
+    def __init__(self, folder: Path, limit_bytes: int = LIMIT_BYTES) -> None:
+        self.folder = folder
+        self.limit_bytes = limit_bytes
+
+    def folders(self) -> list[Path]:
+        """The folders of runs, oldest first."""
+        if not self.folder.is_dir():
+            return []
+        return sorted(
+            (path for path in self.folder.iterdir() if path.name.isdecimal()), key=lambda path: int(path.name)
+        )
+
+    def begin(self) -> Path:
+        """A new folder for a run, with room made for it. Raises OSError."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.make_room()
+        number = max((int(path.name) for path in self.folders()), default=0) + 1
+        folder = self.folder / f"{number:04d}"
+        folder.mkdir()
+        return folder
+
+    def make_room(self) -> None:
+        """Delete the oldest runs until the limit and the disk leave room. Raises OSError where the disk is full."""
+        sizes = {folder: size_of(folder) for folder in self.folders()}
+        taken = sum(sizes.values())
+        for folder, size in sizes.items():
+            if taken <= self.limit_bytes and self._free_bytes() >= RESERVE_BYTES:
+                return
+            shutil.rmtree(folder)
+            taken -= size
+        if self._free_bytes() < RESERVE_BYTES:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self.folder))
+
+    def _free_bytes(self) -> int:
+        return shutil.disk_usage(self.folder).free
+
+
+def size_of(folder: Path) -> int:
+    """What the files of a folder take."""
+    return sum(path.stat().st_size for path in folder.iterdir() if path.is_file())
+
+
+def own_folder(robot: str, environment: Mapping[str, str]) -> Path:
+    """Where a daemon keeps its runs unless it is told otherwise.
+
+    Under a service manager that is the folder of its state (systemd.exec(5), StateDirectory=), else the person's own
+    (XDG Base Directory Specification, XDG_STATE_HOME).
+    """
+    given = environment.get("STATE_DIRECTORY", "").partition(":")[0]
+    return Path(given) / RUNS if given else _person_folder(environment) / robot / RUNS
+
+
+def _person_folder(environment: Mapping[str, str]) -> Path:
+    state = environment.get("XDG_STATE_HOME") or str(Path.home() / ".local" / "state")
+    return Path(state) / "canhelm"
+
+
+def all_folders(given: Path | None, environment: Mapping[str, str]) -> list[Path]:
+    """The folders in which to look for runs.
+
+    Args:
+        given: the one that a person named; None: of this person's robots and of the services.
+        environment: of this process.
+
+    Raises:
+        UsageError: there is no such folder.
+        ConfigError: runs of a service are closed to this user.
+    """
+    if given is not None:
+        if not given.is_dir():
+            raise UsageError(f"there is no folder {given}", value=str(given), remedy="name a folder of runs")
+        return [given]
+    found: list[Path] = []
+    closed = ""
+    for root in (SYSTEM_FOLDER, _person_folder(environment)):
+        try:
+            found += [robot / RUNS for robot in sorted(root.iterdir()) if (robot / RUNS).is_dir()]
+        except FileNotFoundError:
+            continue
+        except PermissionError as error:
+            closed = error.filename
+    if closed and not found:
+        remedy = "join the group: sudo usermod -aG canhelm $USER, then log in again; or give --runs DIR"
+        raise ConfigError(f"this user may not look into {closed}", remedy=remedy)
+    return found
+
+
+def read_runs(folders: Iterable[Path], robot: str | None = None) -> list[Run]:
+    """All runs of some folders, oldest first; ``robot`` leaves those of others out."""
+    runs = [Run(int(path.name), path, _read_facts(path)) for folder in folders for path in RunStore(folder).folders()]
+    return sorted((run for run in runs if robot in (None, run.robot)), key=lambda run: (run.begun, run.number))
+
+
+def choose(runs: list[Run], name: str) -> Run:
+    """The run that a person means by a number or ``last``. Raises UsageError."""
+    if not runs:
+        remedy = "each motion of `canhelm run` leaves one; --runs DIR looks elsewhere"
+        raise UsageError("there are no runs yet", remedy=remedy)
+    if name == LAST:
+        return runs[-1]
+    if not (name.isascii() and name.isdecimal()):
+        raise UsageError(f"{name!r} is no run", value=name, remedy="give a number of `canhelm runs`, or last")
+    found = [run for run in runs if run.number == int(name)]
+    if not found:
+        raise UsageError(f"there is no run {name}", value=name, remedy="`canhelm runs` lists them")
+    if len(found) > 1:
+        robots = ", ".join(run.robot for run in found)
+        raise UsageError(f"several robots have a run {name}: {robots}", remedy="choose one with --robot NAME")
+    return found[0]
+
+
+def delete(run: Run) -> None:
+    """Delete a run. Raises CanhelmError where this user may not."""
+    try:
+        shutil.rmtree(run.folder)
+    except OSError as error:
+        remedy = "do it as the user that runs the daemon"
+        raise CanhelmError(f"run {run.number} cannot be deleted: {error.strerror}", remedy=remedy) from error
+
+
+def _read_facts(folder: Path) -> dict[str, Any]:
+    try:
+        facts = yaml.safe_load((folder / FACTS).read_text(encoding="utf-8"))
+    except (OSError, ValueError, yaml.YAMLError):
+        return {}
+    return facts if isinstance(facts, dict) else {}

@@ -1,0 +1,260 @@
+"""Each motion leaves a run: what was asked, measured and commanded, and every frame meanwhile."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import platform
+import time
+from datetime import UTC, datetime
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import yaml
+
+from canhelm import __version__
+from canhelm.errors import CanhelmError
+from daemon.runs.store import CYCLES, DRIVES, FACTS, FRAMES, PROFILE, TERMS, RunStore
+from daemon.runtime.clock import VirtualTimeLoop
+from daemon.runtime.cycle_rows import CycleRows
+from daemon.runtime.disk import Disk
+from daemon.runtime.motions import Motion
+from daemon.runtime.supervisor import Supervisor
+from drivers.bus.candump import make_line
+from drivers.bus.contract import Bus
+from drivers.epos.drive import EposDrive
+from profiles.schema import Profile
+
+LOGGER = logging.getLogger("canhelm.runs")
+FLUSH_PERIOD_S = 1.0
+PARTS = 8
+"""A motion that takes more than this part of all room goes on in a new run, so that the oldest can be deleted."""
+
+
+class Recording:
+    """One run under way.
+
+    Args:
+        motion: what leaves it.
+        part: counts the runs of one long motion.
+        now_s: loop time.
+
+    Attributes:
+        folder: where its files are; None until the disk has made it, or where it cannot.
+        failed: the disk failed: nothing more is recorded of it.
+    """
+
+    def __init__(self, motion: Motion, part: int, now_s: float) -> None:
+        self.motion = motion
+        self.part = part
+        self.begun_s = self.flushed_s = now_s
+        self.folder: Path | None = None
+        self.failed = False
+        self.facts: dict[str, Any] = {}
+        self.cycles, self.terms, self.frames = bytearray(), bytearray(), bytearray()
+        self.rows = self.size_bytes = self.lost_bytes = 0
+
+    def take_pending(self) -> dict[str, bytes]:
+        """What was gathered since the last time, by file; nothing of it stays."""
+        pending = {CYCLES: bytes(self.cycles), TERMS: bytes(self.terms), FRAMES: bytes(self.frames)}
+        for gathered in (self.cycles, self.terms, self.frames):
+            gathered.clear()
+        return pending
+
+
+class RunRecorder:
+    """Records every motion into a folder of its own.
+
+    Nothing is written within a control cycle: rows and frames are gathered, and written by a thread once a second. A
+    disk that fails or is full ends the recording of that run with a warning; the next run tries again.
+
+    Args:
+        store: where runs are kept.
+        supervisor: whose motions they are.
+        bus: whose frames are recorded while something moves.
+        profile: the robot as it is run.
+        spec: of the bus.
+
+    Attributes:
+        message: what the disk said of the newest run; empty while it works.
+    """
+
+    def __init__(self, store: RunStore, supervisor: Supervisor, bus: Bus, profile: Profile, spec: str) -> None:
+        self.message = ""
+        self._store = store
+        self._supervisor = supervisor
+        self._bus = bus
+        self._profile = profile
+        self._spec = spec
+        self._recordings: list[Recording] = []
+        self._last: Path | None = None
+
+    def start(self) -> None:
+        """Record every motion from now on, on the running loop."""
+        self._loop = asyncio.get_running_loop()
+        virtual = isinstance(self._loop, VirtualTimeLoop)
+        self._epoch_s = 0.0 if virtual else time.time() - self._loop.time()
+        self._disk = Disk(self._on_failure)
+        self._rows = CycleRows(self._supervisor)
+        self._supervisor.on_motion.append(self._begin)
+
+    def close(self) -> None:
+        """End the runs under way and write what is left."""
+        self._supervisor.on_motion.remove(self._begin)
+        for recording in list(self._recordings):
+            self._end(recording)
+        self._disk.close()
+
+    def status(self) -> dict[str, Any]:
+        """The runs for ``status``."""
+        last = self._last.name if self._last else None
+        return {"folder": str(self._store.folder), "last": last, "message": self.message}
+
+    # --- a run -------------------------------------------------------------------------------------------------
+
+    def _begin(self, motion: Motion, part: int = 1) -> None:
+        if not self._recordings:
+            self._bus.taps.append(self._on_frame)
+            self._supervisor.observers.append(self._on_cycle)
+        self.message = ""
+        recording = Recording(motion, part, self._loop.time())
+        recording.facts = self._facts(recording)
+        recording.cycles += self._rows.head
+        self._recordings.append(recording)
+        drives = self._confirmed()
+        self._disk.do(partial(self._make_folder, recording, dict(recording.facts), drives))
+
+    def _make_folder(self, recording: Recording, facts: dict[str, Any], drives: dict[str, Any]) -> None:
+        """In the disk's thread: the folder, and what is known before the first cycle."""
+        folder = self._store.begin()
+        _write_yaml(folder / PROFILE, self._profile)
+        _write_yaml(folder / DRIVES, drives)
+        _write_yaml(folder / FACTS, facts)
+        recording.folder = self._last = folder
+
+    def _facts(self, recording: Recording) -> dict[str, Any]:
+        motion, vehicle = recording.motion, self._profile.vehicle
+        begun_unix_s = self._epoch_s + recording.begun_s
+        return {
+            "robot": self._profile.name,
+            "vehicle": vehicle.type if vehicle else None,
+            "motion": motion.kind,
+            "asked": motion.asked,
+            "drives": list(motion.drives),
+            "part": recording.part,
+            "begun": datetime.fromtimestamp(begun_unix_s, UTC).isoformat(timespec="milliseconds"),
+            "begun_unix_s": round(begun_unix_s, 6),
+            "bus": self._spec,
+            "versions": {"canhelm": __version__, "python": platform.python_version(), "kernel": platform.release()},
+        }
+
+    def _confirmed(self) -> dict[str, Any]:
+        drives = self._supervisor.devices.drives.values()
+        return {
+            drive.name: {f"{entry.address} {entry.name}": value for entry, value in drive.confirmed.items()}
+            for drive in drives
+            if isinstance(drive, EposDrive)
+        }
+
+    def _end(self, recording: Recording, ended: str | None = None, message: str = "") -> None:
+        self._recordings.remove(recording)
+        if not self._recordings:
+            self._bus.taps.remove(self._on_frame)
+            self._supervisor.observers.remove(self._on_cycle)
+        self._flush(recording)
+        facts = {
+            **recording.facts,
+            "duration_s": round(self._loop.time() - recording.begun_s, 3),
+            **({"ended": ended, "message": message, "result": {}} if ended else _ending(recording.motion)),
+            "rows": recording.rows,
+            "lost_bytes": recording.lost_bytes,
+        }
+        self._disk.do(partial(self._write_facts, recording, facts))
+
+    @staticmethod
+    def _write_facts(recording: Recording, facts: dict[str, Any]) -> None:
+        if recording.folder is not None:
+            _write_yaml(recording.folder / FACTS, facts)
+
+    # --- gathering ---------------------------------------------------------------------------------------------
+
+    def _on_cycle(self) -> None:
+        now_s = self._loop.time()
+        row = self._rows.row()
+        for recording in list(self._recordings):
+            if not recording.failed:
+                self._take(recording, row, now_s)
+            if recording.motion.closed.is_set():
+                self._end(recording)
+            elif recording.size_bytes > self._store.limit_bytes / PARTS:
+                self._end(recording, "continued", "goes on in the next run")
+                self._begin(recording.motion, recording.part + 1)
+
+    def _take(self, recording: Recording, row: str, now_s: float) -> None:
+        motion, time_s = recording.motion, now_s - recording.begun_s
+        recording.rows += 1
+        recording.cycles += f"{time_s:.4f},{row}\n".encode()
+        if motion.running:
+            terms = motion.progress() if motion.record is None else motion.record
+            recording.terms += msgspec.json.encode({"time_s": round(time_s, 4), "terms": terms}) + b"\n"
+        if now_s - recording.flushed_s >= FLUSH_PERIOD_S:
+            recording.flushed_s = now_s
+            self._flush(recording)
+
+    def _on_frame(self, can_id: int, data: bytes, timestamp_s: float) -> None:
+        line = f"{make_line(self._epoch_s + timestamp_s, self._bus.name, can_id, data)}\n".encode()
+        for recording in self._recordings:
+            recording.frames += line
+
+    # --- writing -----------------------------------------------------------------------------------------------
+
+    def _flush(self, recording: Recording) -> None:
+        pending = recording.take_pending()
+        size = sum(map(len, pending.values()))
+        if recording.failed:
+            return
+        if self._disk.do(partial(self._append, recording, pending), size):
+            recording.size_bytes += size
+        else:
+            recording.lost_bytes += size
+
+    def _append(self, recording: Recording, pending: dict[str, bytes]) -> None:
+        """In the disk's thread."""
+        if recording.folder is None:
+            return
+        for name, data in pending.items():
+            with (recording.folder / name).open("ab") as file:
+                file.write(data)
+
+    def _on_failure(self, error: OSError) -> None:
+        told = f"runs cannot be written to {self._store.folder}: {error.strerror or error}"
+        for recording in self._recordings:
+            recording.failed = True
+        if not self.message:
+            self._supervisor.log.add(
+                "warning", "runs", told, "make room there, or `canhelm runs delete`; motions go on"
+            )
+        self.message = told
+
+
+def _ending(motion: Motion) -> dict[str, Any]:
+    """How a motion ended, as far as it has."""
+    if not motion.ended.done():
+        return {"ended": "cut off", "message": "the daemon went down", "result": {}}
+    error = motion.ended.exception()
+    if error is None:
+        return {"ended": "done", "message": "", "result": motion.ended.result()}
+    name = "stopped" if motion.stop_reason else type(error).__name__
+    message = error.message if isinstance(error, CanhelmError) else str(error)
+    return {"ended": name, "message": message, "result": {}}
+
+
+def _plain(value: Any) -> Any:
+    """As plain lists, mappings, numbers and words, which is all that YAML takes."""
+    return msgspec.json.decode(msgspec.json.encode(value, enc_hook=str))
+
+
+def _write_yaml(path: Path, value: Any) -> None:
+    path.write_text(yaml.safe_dump(_plain(value), sort_keys=False, allow_unicode=True), encoding="utf-8")
