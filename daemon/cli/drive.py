@@ -8,6 +8,7 @@ from cyclopts import App, Parameter
 
 from daemon.cli.motion import run_motion
 from daemon.cli.options import DEFAULT, NoWait, Options
+from daemon.cli.output import Json
 
 app = App(name="drive", help="Drive the vehicle.")
 
@@ -188,3 +189,43 @@ def path(
         "dry_run": dry_run,
     }
     return drive_path(options, file, no_wait=no_wait, **params)
+
+
+@app.command
+def record(file: str, /, *, duration: float | None = None, rate: float = 10.0, options: Options = DEFAULT) -> int:
+    """Record where the vehicle goes, whoever drives it, until Ctrl-C; `canhelm drive fit` makes a path of it.
+
+    Example: `canhelm drive record way.csv --duration 60`
+
+    Parameters
+    ----------
+    file: str
+        Where to write the record (CSV).
+    duration: float
+        Seconds.
+    rate: float
+        Rows a second, up to 50.
+    """
+    from daemon.cli.path_recording import record as record_path
+
+    return record_path(options, file, duration, rate)
+
+
+@app.command
+def fit(record: str, file: str, /, *, tolerance: float = 0.01, json: Json = None) -> int:
+    """Make a path file of lines and arcs from a record; needs no daemon.
+
+    Example: `canhelm drive fit way.csv way.yaml --tolerance 0.005`
+
+    Parameters
+    ----------
+    record: str
+        What `canhelm drive record` wrote.
+    file: str
+        The path file to write.
+    tolerance: float
+        Metres by which the path may be off what was recorded.
+    """
+    from daemon.cli.path_recording import fit as fit_path
+
+    return fit_path(record, file, tolerance, json)

@@ -1,0 +1,159 @@
+"""Recording where a vehicle goes, and making a path file of it."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, TextIO
+
+from canhelm.errors import Refused, UsageError
+from daemon.cli.motion import signals_interrupt
+from daemon.cli.options import Options
+from daemon.cli.output import say, show
+from daemon.loops.odometry import Pose
+from daemon.loops.path import Piece
+from daemon.loops.path_fitting import deviation, fit_pieces, split_runs
+
+COLUMNS = ("time_s", "x_m", "y_m", "yaw_deg", "trailer_x_m", "trailer_y_m", "trailer_yaw_deg")
+"""Of a record; the last three are empty for a vehicle without a trailer."""
+LONGEST_RECORD = 1_000_000
+SLIGHTEST_RAD = 1e-5
+"""An arc that turns less is written as a line."""
+
+
+def record(options: Options, name: str, duration_s: float | None, rate_hz: float) -> int:
+    """Write where the vehicle is, row by row, until the time is over or somebody interrupts; the exit code."""
+    with options.client() as client, _opened(name, "w") as file:
+        if "odometry" not in client.status()["vehicle"]:
+            raise Refused("this vehicle does not know where it is", remedy="record one that has an odometry")
+        rows = csv.writer(file)
+        rows.writerow(COLUMNS)
+        count, begin_s = 0, None
+        try:
+            with signals_interrupt():
+                say("recording; Ctrl-C ends it")
+                for kind, status in client.notifications(rate_hz):
+                    if kind != "status":
+                        continue
+                    begin_s = status["time_s"] if begin_s is None else begin_s
+                    rows.writerow(_row(status, begin_s))
+                    count += 1
+                    if duration_s is not None and status["time_s"] - begin_s >= duration_s:
+                        break
+        except KeyboardInterrupt:
+            pass
+    show({"record": name, "rows": count}, json=options.json)
+    return 0
+
+
+def _row(status: dict[str, Any], begin_s: float) -> list[Any]:
+    vehicle = status["vehicle"]
+    poses = (vehicle["odometry"], vehicle.get("trailer") or {})
+    cells = (pose.get(key, "") for pose in poses for key in ("x_m", "y_m", "yaw_deg"))
+    return [round(status["time_s"] - begin_s, 3), *cells]
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A part of a record in one driving direction: poses of its reference point, and the pieces that fit them."""
+
+    poses: Sequence[Pose]
+    pieces: Sequence[Piece]
+
+
+def fit(name: str, out: str, tolerance_m: float, json: bool | None) -> int:
+    """Make a path file of a record; the exit code.
+
+    Args:
+        name: of the record.
+        out: the path file.
+        tolerance_m: what the path may be off.
+        json: how to print.
+
+    Raises:
+        UsageError: the record or the tolerance makes no sense, or a file cannot be opened.
+    """
+    if not 1e-4 <= tolerance_m <= 1.0:
+        raise UsageError(f"a tolerance of {tolerance_m:g} m makes no sense", remedy="give 0.0001 to 1")
+    runs = [_fitted(*run, tolerance_m) for run in _runs(*_read(name))]
+    if not runs:
+        raise UsageError(f"{name}: the vehicle hardly moved", value=name, remedy="record while it drives")
+    with _opened(out, "w") as file:
+        file.writelines(f"{line}\n" for line in _path_lines(name, runs))
+    pieces = [piece for run in runs for piece in run.pieces]
+    numbers = {
+        "file": out,
+        "pieces": len(pieces),
+        "length_m": round(math.fsum(piece.length_m for piece in pieces), 3),
+        "deviation_m": round(max(deviation(run.poses, run.pieces) for run in runs), 5),
+    }
+    show(numbers, json=json)
+    return 0
+
+
+def _opened(name: str, mode: Literal["r", "w"]) -> TextIO:
+    try:
+        return Path(name).open(mode, newline="", encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"{name}: {error.strerror}", value=name, remedy="name a file that can be opened") from None
+
+
+def _read(name: str) -> tuple[list[Pose], list[Pose]]:
+    """Poses of the truck, and of the unit that is the reference backwards."""
+    trucks, trailers = [], []
+    with _opened(name, "r") as file:
+        for number, row in enumerate(csv.reader(file), start=1):
+            if number > LONGEST_RECORD:
+                raise UsageError(f"{name}: more than {LONGEST_RECORD} rows", value=name, remedy="record it in parts")
+            if number == 1 and tuple(row) == COLUMNS:
+                continue
+            try:
+                truck = _pose(row[1:4])
+                trucks.append(truck)
+                trailers.append(_pose(row[4:7]) if row[4] else truck)
+            except (ValueError, IndexError):
+                what = f"{name}:{number}: is no row of a record"
+                raise UsageError(what, value=name, remedy=f"its columns are {', '.join(COLUMNS)}") from None
+    return trucks, trailers
+
+
+def _pose(cells: Sequence[str]) -> Pose:
+    x, y, yaw_deg = map(float, cells)
+    if not math.isfinite(x + y + yaw_deg):
+        raise ValueError(cells)
+    return Pose(x, y, math.radians(yaw_deg))
+
+
+def _runs(trucks: list[Pose], trailers: list[Pose]) -> Iterator[tuple[bool, list[Pose]]]:
+    for backward, indices in split_runs(trucks):
+        poses = trailers if backward else trucks
+        yield backward, [poses[index] for index in indices]
+
+
+def _fitted(backward: bool, poses: list[Pose], tolerance_m: float) -> Run:
+    return Run(poses, fit_pieces(poses, tolerance_m, backward))
+
+
+def _path_lines(name: str, runs: list[Run]) -> Iterator[str]:
+    """The path file, line by line."""
+    first = runs[0].pieces[0]
+    yield f"# Fitted to {Path(name).name}."
+    yield f"start: {{x_m: {first.x_m:.5f}, y_m: {first.y_m:.5f}, heading_deg: {math.degrees(first.heading(0.0)):.5f}}}"
+    yield "pieces:"
+    for number, run in enumerate(runs):
+        begin = run.pieces[0]
+        drive = "backward" if begin.backward else "forward"
+        place = f"from_m: [{begin.x_m:.5f}, {begin.y_m:.5f}], " if number else ""
+        yield f"  - {{drive: {drive}, {place}{_shape(begin)}}}"
+        for piece in run.pieces[1:]:
+            yield f"  - {{{_shape(piece)}}}"
+
+
+def _shape(piece: Piece) -> str:
+    turn = piece.curvature * piece.length_m
+    if abs(turn) < SLIGHTEST_RAD:
+        return f"line_m: {piece.length_m:.5f}"
+    return f"arc_deg: {math.degrees(turn):.6f}, radius_m: {1 / abs(piece.curvature):.5f}"
