@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from daemon.api.encoder_methods import ENCODER_METHODS
 from daemon.api.localisation_methods import LOCALISATION_METHODS
 from daemon.api.nxt_methods import NXT_METHODS
 from daemon.api.parameters import REQUIRED, Method, Param, Role
@@ -366,7 +367,19 @@ _CONFIG = (
 
 METHODS: dict[str, Method] = {
     method.name: method
-    for method in (*_TALK, *_WHOLE, *_MOTOR, *_VEHICLE, *_NETWORK, *_NODES, *_CONFIG, *NXT_METHODS, *LOCALISATION_METHODS, *SIMULATION_METHODS)
+    for method in (
+        *_TALK,
+        *_WHOLE,
+        *_MOTOR,
+        *_VEHICLE,
+        *_NETWORK,
+        *_NODES,
+        *_CONFIG,
+        *NXT_METHODS,
+        *LOCALISATION_METHODS,
+        *ENCODER_METHODS,
+        *SIMULATION_METHODS,
+    )
 }
 
 NOTIFICATIONS = {

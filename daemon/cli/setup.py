@@ -10,16 +10,14 @@ from cyclopts import Parameter
 from cyclopts.validators import Number
 
 from canhelm.aio import Client
-from canhelm.errors import ConfigError, NotReady
 from daemon.cli.motion import INTERRUPTED
 from daemon.cli.options import DEFAULT, Options
 from daemon.cli.output import say, say_warning, show
+from daemon.cli.own_profile import own_profile
 from daemon.cli.terminal import Terminal
 
 if TYPE_CHECKING:
     from daemon.commissioning.wheels import Findings
-    from profiles.loader import LoadedProfile
-    from profiles.schema import Profile
 
 Current = Annotated[int, Parameter(validator=Number(gte=50, lte=5000), help="Highest current meanwhile [mA].")]
 
@@ -45,7 +43,7 @@ async def _setup(what: str, current_ma: int, person: Terminal, options: Options)
     from daemon.commissioning.session import changes_of, commission
 
     async with Client(options.socket, options.robot) as daemon:
-        loaded = profile_of(await daemon.status())
+        loaded = own_profile(await daemon.status())
         findings = await commission(daemon, person, loaded.profile, what, current_ma)
     changes = changes_of(loaded.profile, findings)
     show(_result(findings, changes), json=options.json)
@@ -57,33 +55,6 @@ async def _setup(what: str, current_ma: int, person: Terminal, options: Options)
     if changes:
         await _write(loaded.path, findings, changes, person)
     return 0
-
-
-def profile_of(status: dict[str, Any]) -> LoadedProfile:
-    """The profile that the daemon runs with, from its file.
-
-    Raises:
-        ConfigError: it has none of its own, or the file says something else by now.
-        NotReady: a node is not ready.
-    """
-    from profiles.loader import SHIPPED, load
-
-    file = status["profile_file"]
-    if file is None or Path(file).is_relative_to(SHIPPED):
-        remedy = "begin one: `canhelm profile new NAME --extends max2d --out NAME.yaml`, and run the daemon with it"
-        raise ConfigError("this robot has no profile of its own that could be changed", value=file, remedy=remedy)
-    loaded = load(file)
-    if _nodes(loaded.profile) != {node["name"]: node["node"] for node in status["nodes"] if node.get("node")}:
-        raise ConfigError(f"{file} has changed since the daemon was started", value=file, remedy="start it anew")
-    absent = [str(node["status"]) for node in status["nodes"] if node["node_state"] != "ready"]
-    if absent:
-        raise NotReady("; ".join(absent), remedy="all nodes have to be there: see `canhelm status`")
-    return loaded
-
-
-def _nodes(profile: Profile) -> dict[str, int]:
-    drives = {name: drive.node for name, drive in profile.drives.items()}
-    return drives | {name: encoder.node for name, encoder in profile.encoders.items()}
 
 
 def _result(findings: Findings, changes: dict[str, tuple[Any, Any]]) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from canhelm.errors import Interlock, Refused
 from daemon.runtime.brake_commands import BrakeCommands
 from daemon.runtime.brick_commands import BrickCommands
 from daemon.runtime.config_commands import ConfigCommands
+from daemon.runtime.encoder_commands import EncoderCommands
 from daemon.runtime.handlers import Handler, Params, holder, run_motion
 from daemon.runtime.motions import Motion
 from daemon.runtime.motor_commands import MotorCommands
@@ -42,6 +43,7 @@ class Commands:
             **MotorCommands(supervisor).handlers,
             **BrakeCommands(supervisor).handlers,
             **BrickCommands(supervisor).handlers,
+            **EncoderCommands(supervisor).handlers,
             **NetworkCommands(supervisor).handlers,
             **NodeCommands(supervisor).handlers,
             **ConfigCommands(supervisor).handlers,
