@@ -3,7 +3,8 @@
     .venv/bin/python -m benchmarks.traction [SEEDS]
 
 Each scenario is driven without traction control, with the published one, and with the improved one by accelerometer and
-by motor currents alone; first on the small plant of the tests, then on the simulated Turtle. Last the MAX2D.
+by motor currents alone; first on the small plant of the tests, then on the simulated Turtle over the bus. Last the
+MAX2D.
 """
 
 from __future__ import annotations
@@ -14,24 +15,20 @@ import time
 from collections.abc import Callable
 from statistics import mean
 
+from benchmarks import turtle_on_bus
 from daemon.loops.planner import PlanarState
 from daemon.loops.traction import Traction
 from profiles.schema import FloorPatch
-from vcan_tests.daemon.gripping_robot import FLOOR_ROBOT, Drive, Floor, Way, drive
+from vcan_tests.daemon import gripping_robot
+from vcan_tests.daemon.gripping_robot import Drive, Way
 from vcan_tests.daemon.omni_floor import ICE, OmniFloor, dry, ice_between
-from vcan_tests.daemon.omni_twin import TwinFloor, robot_data, turtle
 from vcan_tests.daemon.test_max2d_traction import WHERE, driven
 
 GOAL = PlanarState(3.0, 0.0)
 HEAD = f"{'':34}{'arrives':>8}{'lost':>7}{'aside':>8}{'end off':>9}{'changes':>9}{'turns':>7}{'found/missed/false':>20}"
 
-Scenarios = dict[str, tuple[Callable[[int], Floor], Callable[[int], Floor]]]
-
-
-def patch(x_from: float, x_to: float, y_from: float = -9.0, y_to: float = 9.0) -> FloorPatch:
-    middle = (x_from + x_to) / 2, (y_from + y_to) / 2
-    return FloorPatch(x_m=middle[0], y_m=middle[1], length_m=x_to - x_from, width_m=y_to - y_from, friction=ICE)
-
+Make = Callable[[str, int, Way, bool], Drive]
+"""A drive of a scenario, with a seed, by a way to answer slip, with or without the accelerometer."""
 
 PATCHES = {
     "dry": None,
@@ -53,32 +50,36 @@ def report(name: str, drives: list[Drive], undisturbed_s: float) -> None:
     print(f"{name:34}{arrived:7.2f}s{lost:6.2f}s{aside:7.3f}m{off:8.3f}m{changes:9.1f}{turns:7.1f}{events:>20}")
 
 
-def compare(title: str, make: Callable[[str, int], Floor], twin: bool, seeds: range) -> None:
+def compare(title: str, make: Make, seeds: range) -> None:
     """All scenarios on one plant."""
-    robot = robot_data(turtle()) if twin else FLOOR_ROBOT
-    undisturbed_s = drive(make("dry", 1), GOAL, Way.OFF, robot=robot).arrived_s
+    undisturbed_s = make("dry", 1, Way.OFF, False).arrived_s
     print(f"\n{title}; means over {len(seeds)} seeds\n{HEAD}")
+    ways = {
+        "off": (Way.OFF, False),
+        "published": (Way.PUBLISHED, False),
+        "improved, accelerometer": (Way.IMPROVED, False),
+        "improved, currents": (Way.IMPROVED, True),
+    }
     for scenario in PATCHES:
-        ways = {
-            "off": (Way.OFF, False),
-            "published": (Way.PUBLISHED, False),
-            "improved, accelerometer": (Way.IMPROVED, False),
-            "improved, currents": (Way.IMPROVED, True),
-        }
         print(scenario)
         for name, (way, by_currents) in ways.items():
-            drives = [drive(make(scenario, seed), GOAL, way, by_currents=by_currents, robot=robot) for seed in seeds]
-            report(f"  {name}", drives, undisturbed_s)
+            report(f"  {name}", [make(scenario, seed, way, by_currents) for seed in seeds], undisturbed_s)
 
 
-def small_plant(scenario: str, seed: int) -> Floor:
+def small_plant(scenario: str, seed: int, way: Way, by_currents: bool) -> Drive:
     bounds = PATCHES[scenario]
-    return OmniFloor(ice_between(*bounds) if bounds else dry, seed)
+    floor = OmniFloor(ice_between(*bounds) if bounds else dry, seed)
+    return gripping_robot.drive(floor, GOAL, way, by_currents=by_currents)
 
 
-def simulated_turtle(scenario: str, seed: int) -> Floor:
+def turtle(scenario: str, seed: int, way: Way, by_currents: bool) -> Drive:
     bounds = PATCHES[scenario]
-    return TwinFloor(turtle(ice=patch(*bounds)) if bounds else turtle(), seed)
+    return turtle_on_bus.drive(_patch(*bounds) if bounds else None, seed, way, by_currents=by_currents)
+
+
+def _patch(x_from: float, x_to: float, y_from: float, y_to: float) -> FloorPatch:
+    middle = (x_from + x_to) / 2, (y_from + y_to) / 2
+    return FloorPatch(x_m=middle[0], y_m=middle[1], length_m=x_to - x_from, width_m=y_to - y_from, friction=ICE)
 
 
 def max2d() -> None:
@@ -103,8 +104,8 @@ def cost_us() -> float:
 def main() -> None:
     seeds = range(1, 1 + (int(sys.argv[1]) if len(sys.argv) > 1 else 3))
     print(f"seeds {seeds.start} to {seeds.stop - 1}; ice has a friction of {ICE}")
-    compare("small plant, accelerometer noise 0.1 m/s2", small_plant, False, seeds)
-    compare("simulated Turtle", simulated_turtle, True, seeds)
+    compare("small plant, accelerometer noise 0.1 m/s2", small_plant, seeds)
+    compare("simulated Turtle over the bus", turtle, seeds)
     max2d()
     print(f"\none step of traction control: {cost_us():.1f} us at the median")
 

@@ -15,6 +15,8 @@ from profiles.schema import OmniGeometry, Profile
 BY_ACCELEROMETER: Final = ObserverTuning(trust_s=0.4, distrust_s=1.0, turning_by_wheels=True)
 BY_CURRENTS: Final = ObserverTuning(trust_s=0.25, distrust_s=1.5, slip_m_s=0.12, turning_by_wheels=True)
 """Forces by currents are less exact than an accelerometer: the observer is not to believe them for long."""
+LONGEST_SLIP_S: Final = 0.8
+"""Slip that lasts longer is the observer's own error, unless an obstacle is pushed: the wheels are believed again."""
 PUSHING_M_S2: Final = 1.0
 """Acceleration that an obstacle takes from a robot with slipping wheels, from which on the robot pushes it."""
 
@@ -88,6 +90,7 @@ class OmniSenses:
         self._odometry = OmniOdometry(kinematics)
         self._sensor = Accelerometer(mounting)
         self._observer = observer
+        self._slipping_s = 0.0
         self.observing = observer is not None
         self.centre: CentreAcceleration | None = None
         self.acceleration: Vector | None = None
@@ -137,5 +140,8 @@ class OmniSenses:
             return None
         speeds, currents = measurement.wheel_speed_m_s, measurement.motor_current_a
         seen = self._observer.step(speeds, currents, dt, self.acceleration)
+        self._slipping_s = self._slipping_s + dt if any(seen.slipping) else 0.0
+        if self._slipping_s > LONGEST_SLIP_S and not self.pushing:
+            self._observer.restart()
         self.acceleration = (seen.acceleration[0], seen.acceleration[1])
         return seen

@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 from itertools import pairwise
-from typing import Protocol
 
-from daemon.loops.accelerometer import Mounting, Vector
+from daemon.loops.accelerometer import Mounting
 from daemon.loops.measurement import Measurement
 from daemon.loops.omni import OmniKinematics, turtle_wheels
 from daemon.loops.omni_drive import OmniLaw, OmniRecord
@@ -18,33 +17,16 @@ from daemon.loops.planner import PlanarLimits, PlanarState, Result
 from daemon.loops.slip_observer import Body, RimDrive, SlipObserver
 from daemon.loops.traction import Traction, TractionTuning
 from vcan_tests.daemon import omni_floor
-from vcan_tests.daemon.omni_floor import CYCLE_S
+from vcan_tests.daemon.omni_floor import CYCLE_S, OmniFloor
 
 KINEMATICS = OmniKinematics(turtle_wheels(0.2, 0.2, 0.2))
 PLACE, ROTATION = omni_floor.SENSOR
 DRIVE = RimDrive(omni_floor.FORCE_PER_A, omni_floor.RIM_MASS_KG, omni_floor.FRICTION_N, omni_floor.EFFICIENCY)
 BODY = Body(omni_floor.MASS_KG, omni_floor.YAW_INERTIA)
 LONGEST_S = 12.0
-
-
-@dataclass(frozen=True)
-class RobotData:
-    """What the loops know of a robot."""
-
-    limits: PlanarLimits
-    drive: RimDrive
-    body: Body
-    mounting: Mounting
-    tuning: TractionTuning = field(default_factory=TractionTuning)
-
-
-FLOOR_ROBOT = RobotData(
-    PlanarLimits(1.5, 1.5, 3.0, 6.0),
-    DRIVE,
-    BODY,
-    Mounting(PLACE.real, PLACE.imag, ROTATION),
-    TractionTuning(delay_cycles=2),
-)
+LIMITS = PlanarLimits(1.5, 1.5, 3.0, 6.0)
+MOUNTING = Mounting(PLACE.real, PLACE.imag, ROTATION)
+TUNING = TractionTuning(delay_cycles=2)
 SLIPS_M_S = 0.06
 """True slip speed of a wheel that counts as slip."""
 TOGETHER_S = 0.1
@@ -111,20 +93,6 @@ def near(a: tuple[int, int], b: tuple[int, int]) -> bool:
     return a[0] <= b[1] + reach and b[0] <= a[1] + reach
 
 
-class Floor(Protocol):
-    """A robot in its room: :class:`OmniFloor`, or the twin in :mod:`vcan_tests.daemon.omni_twin`."""
-
-    reading: Vector
-    rims: list[float]
-    currents: list[float]
-    slips: list[float]
-    place: complex
-    velocity: complex
-    heading: float
-
-    def roll(self, rim_targets: tuple[float, ...]) -> None: ...
-
-
 class Way(StrEnum):
     """How slip is answered."""
 
@@ -133,26 +101,26 @@ class Way(StrEnum):
     IMPROVED = "improved"
 
 
-def guide(way: Way, goal: PlanarState, robot: RobotData) -> Guide:
+def guide(way: Way, goal: PlanarState) -> Guide:
     """What leads the robot to a goal."""
     if way is Way.PUBLISHED:
-        return PublishedGuide(goal, robot.limits, CYCLE_S, None, 0.1)
-    traction = Traction(robot.limits.acceleration, robot.tuning) if way is Way.IMPROVED else None
-    return GoalGuide(goal, robot.limits, traction)
+        return PublishedGuide(goal, LIMITS, CYCLE_S, None, 0.1)
+    traction = Traction(LIMITS.acceleration, TUNING) if way is Way.IMPROVED else None
+    return GoalGuide(goal, LIMITS, traction)
 
 
 class Daemon:
     """The law of the omni-wheel vehicle on a floor."""
 
-    def __init__(self, floor: Floor, goal: PlanarState, way: Way, by_currents: bool, robot: RobotData) -> None:
+    def __init__(self, floor: OmniFloor, goal: PlanarState, way: Way, by_currents: bool) -> None:
         self._floor = floor
         self._by_currents = by_currents
         tuning = BY_CURRENTS if by_currents else BY_ACCELEROMETER
-        observer = SlipObserver(robot.body, [robot.drive] * 3, KINEMATICS.forward, tuning=tuning)
-        self.senses = OmniSenses(KINEMATICS, robot.mounting, observer if way is Way.IMPROVED else None)
+        observer = SlipObserver(BODY, [DRIVE] * 3, KINEMATICS.forward, tuning=tuning)
+        self.senses = OmniSenses(KINEMATICS, MOUNTING, observer if way is Way.IMPROVED else None)
         self._travel = [0.0, 0.0, 0.0]
         self._feel(0.0)
-        self.law = OmniLaw(KINEMATICS, guide(way, goal, robot), robot.limits, self.senses)
+        self.law = OmniLaw(KINEMATICS, guide(way, goal), LIMITS, self.senses)
 
     def step(self, now: float) -> OmniRecord:
         """One cycle: feel, decide, roll."""
@@ -170,12 +138,10 @@ class Daemon:
         self.senses.update(measurement, CYCLE_S, powered=True, standing=False)
 
 
-def drive(
-    floor: Floor, goal: PlanarState, way: Way, *, by_currents: bool = False, robot: RobotData = FLOOR_ROBOT
-) -> Drive:
+def drive(floor: OmniFloor, goal: PlanarState, way: Way, *, by_currents: bool = False) -> Drive:
     """Drive to a goal."""
     driven = Drive()
-    daemon = Daemon(floor, goal, way, by_currents, robot)
+    daemon = Daemon(floor, goal, way, by_currents)
     for number in range(round(LONGEST_S / CYCLE_S)):
         now = number * CYCLE_S
         slip = max(map(abs, floor.slips))
