@@ -9,7 +9,7 @@ the side) is divided into the fewest parts whose lines stay near.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from itertools import pairwise
 from typing import Final, NamedTuple
 
@@ -25,13 +25,16 @@ SAME_M: Final = 0.002
 NEAR_M: Final = 0.01
 """Deviation up to which what cannot be driven is divided."""
 MAX_PARTS: Final = 2000
-MAX_MERGED: Final = 100
+MAX_MERGED: Final = 50
 MERGED_NEARLY: Final = 1.1
 """How far from the most pieces that one can stand for the search may end."""
 MAX_SWEEP_RAD: Final = math.tau / 3
 """Of one arc: the robot's place and yaw are put right at its stops."""
 SPARE_RAD: Final = math.radians(1.5)
 """Left to the limits of steering: the robot never stands quite as planned."""
+
+
+Search = Generator[None, None, list[DrivenPiece]]
 
 
 class Part(NamedTuple):
@@ -99,8 +102,8 @@ class PiecePlanner:
         self._yaw_rad = yaw_rad
         self._merged = 1
 
-    def __iter__(self) -> Iterator[DrivenPiece]:
-        """The pieces, in the order of travel.
+    def __iter__(self) -> Iterator[DrivenPiece | None]:
+        """The pieces, in the order of travel; None after each millisecond or two of work that has found none yet.
 
         Raises:
             LimitExceeded: a piece of the path can in no way be driven; ``object`` names it.
@@ -108,7 +111,9 @@ class PiecePlanner:
         for first, last in self._path.sections:
             number = first
             while number <= last:
-                covered = self._longest(number, last) or self._near(number)
+                covered = yield from self._longest(number, last)
+                if not covered:
+                    covered = yield from self._near(number)
                 for driven in covered:
                     self._yaw_rad = driven.end.yaw_rad
                     yield driven
@@ -118,7 +123,7 @@ class PiecePlanner:
         pieces = self._path.pieces
         return [Part(number, pieces[number], 0.0, pieces[number].length_m) for number in range(first, last + 1)]
 
-    def _longest(self, first: int, last: int) -> list[DrivenPiece]:
+    def _longest(self, first: int, last: int) -> Search:
         """One piece for as many of the path's as it can stand for; empty where it cannot even for one."""
         best: list[DrivenPiece] = []
         fitting, failing, size = 0, min(last - first + 1, MAX_MERGED) + 1, self._merged
@@ -129,10 +134,11 @@ class PiecePlanner:
                 best, fitting = [driven], size
             else:
                 failing = size
+            yield None
         self._merged = max(1, fitting)
         return best
 
-    def _near(self, number: int) -> list[DrivenPiece]:
+    def _near(self, number: int) -> Search:
         """About the fewest pieces that stay near one of the path's."""
         whole = self._whole(number, number)[0]
         count = 1
@@ -141,6 +147,7 @@ class PiecePlanner:
             if covered and max(driven.deviation_m for driven in covered) <= NEAR_M:
                 return covered
             count += 1 + count // 8
+            yield None
         raise LimitExceeded(
             f"piece {number} can be driven neither in lines nor in arcs that stay near it",
             object=f"piece {number}",

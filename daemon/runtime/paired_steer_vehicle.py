@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from typing import Any
+from typing import Any, Final
 
 from canhelm.errors import Interlock, Refused, UsageError
 from daemon.loops.geometry import PAIR_NAMES
@@ -30,6 +30,9 @@ from daemon.runtime.path_in_pieces import PiecesPlan
 from daemon.runtime.vehicle import Vehicle
 from drivers.contract import Brake, Drive, SteeringEncoder
 from profiles.schema import PairedSteerGeometry, Profile
+
+PAUSE_S: Final = 0.002
+"""Between two bits of planning a path: about as long as one takes, so that the control cycle keeps its time."""
 
 
 class PairedSteerVehicle(Vehicle):
@@ -118,12 +121,12 @@ class PairedSteerVehicle(Vehicle):
             backward_curvature=math.inf,
             run_out_m=0.0,
         )
-        pieces = []
+        plan = PiecesPlan(self, path, min(request.speed_m_s or self.limits.speed_m_s, self.limits.speed_m_s))
         for piece in PiecePlanner(self.geometry, self.limits, path, pose.yaw_rad):
-            pieces.append(piece)
-            await asyncio.sleep(0)
-        speed = min(request.speed_m_s or self.limits.speed_m_s, self.limits.speed_m_s)
-        return PiecesPlan(self, path, pieces, speed)
+            if piece is not None:
+                plan.add(piece)
+            await asyncio.sleep(PAUSE_S)
+        return plan
 
     def observe(self, measurement: Measurement) -> None:
         """Odometry."""

@@ -42,27 +42,31 @@ class PiecesPlan(PathPlan):
     Args:
         robot: that shall drive them.
         path: to be followed.
-        pieces: in the order of travel.
         speed_m_s: no faster than.
 
     Attributes:
         way: the path.
-        pieces: as given.
+        pieces: in the order of travel.
     """
 
-    def __init__(self, robot: Robot, path: Path, pieces: list[DrivenPiece], speed_m_s: float) -> None:
-        self.way, self.pieces = path, pieces
+    def __init__(self, robot: Robot, path: Path, speed_m_s: float) -> None:
+        self.way = path
+        self.pieces: list[DrivenPiece] = []
         self._robot, self._speed_m_s = robot, speed_m_s
+        self._told: list[dict[str, Any]] = []
+
+    def add(self, piece: DrivenPiece) -> None:
+        """One more piece, in the order of travel."""
+        self.pieces.append(piece)
+        self._told.append(_told(piece, target_of(self._robot.geometry, self._robot.limits, piece, self._speed_m_s)))
 
     def summary(self) -> dict[str, Any]:
         """Number and largest deviation, and each piece with its own."""
-        geometry, limits = self._robot.geometry, self._robot.limits
-        told = [_told(one, target_of(geometry, limits, one, self._speed_m_s)) for one in self.pieces]
         return {
             "stops": len(self.pieces) - 1,
             "length_m": round(sum(one.piece.length_m for one in self.pieces), 4),
             "deviation_m": round(max(one.deviation_m for one in self.pieces), 4),
-            "pieces": told,
+            "pieces": self._told,
         }
 
     def motion(self, lease: str | None) -> PathInPieces:

@@ -28,7 +28,7 @@ curvatures = st.floats(0.05, 1.9) | st.floats(-1.9, -0.05)
 
 
 def planned(path: Path, yaw_rad: float = 0.0) -> list[DrivenPiece]:
-    return list(PiecePlanner(GEOMETRY, LIMITS, path, yaw_rad))
+    return [driven for driven in PiecePlanner(GEOMETRY, LIMITS, path, yaw_rad) if driven is not None]
 
 
 def chained(bends: list[tuple[float, float]], start: Piece | None = None) -> Path:
