@@ -23,6 +23,7 @@ from daemon.calibration.readings import (
     steering_angle,
     write_readings,
 )
+from daemon.cli.calibrate_scale import square, straight
 from daemon.cli.options import DEFAULT, Options, agreed
 from daemon.cli.output import say, show
 
@@ -32,6 +33,9 @@ if TYPE_CHECKING:
 BACK = "back"
 
 app = App(name="calibrate", help="Compare an angle sensor with a protractor, and put what is found into the profile.")
+
+app.command(straight)
+app.command(square)
 
 Range = Annotated[float, Parameter(name="--range", validator=Number(gt=0, lte=180), help="To each side [degrees].")]
 Step = Annotated[float, Parameter(validator=Number(gt=0, lte=90), help="Between two stations [degrees].")]

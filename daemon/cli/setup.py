@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
@@ -17,7 +16,8 @@ from daemon.cli.own_profile import own_profile
 from daemon.cli.terminal import Terminal
 
 if TYPE_CHECKING:
-    from daemon.commissioning.wheels import Findings
+    from daemon.commissioning.wheels import Findings, Values
+    from profiles.loader import LoadedProfile
 
 Current = Annotated[int, Parameter(validator=Number(gte=50, lte=5000), help="Highest current meanwhile [mA].")]
 
@@ -45,7 +45,7 @@ async def _setup(what: str, current_ma: int, person: Terminal, options: Options)
     async with Client(options.socket, options.robot) as daemon:
         loaded = own_profile(await daemon.status())
         findings = await commission(daemon, person, loaded.profile, what, current_ma)
-    changes = changes_of(loaded.profile, findings)
+    changes = changes_of(loaded.profile, findings.values)
     show(_result(findings, changes), json=options.json)
     if findings.unsolved:
         for sentence in findings.unsolved:
@@ -53,7 +53,7 @@ async def _setup(what: str, current_ma: int, person: Terminal, options: Options)
         say("nothing was written: mend it, then begin again")
         return 1
     if changes:
-        await _write(loaded.path, findings, changes, person)
+        await write_changes(loaded, findings.values, person)
     return 0
 
 
@@ -65,16 +65,26 @@ def _result(findings: Findings, changes: dict[str, tuple[Any, Any]]) -> dict[str
     }
 
 
-async def _write(path: Path, findings: Findings, changes: dict[str, tuple[Any, Any]], person: Terminal) -> None:
-    """Show what would be written, and write it where the person agrees. Raises ConfigError, EOFError."""
+async def write_changes(loaded: LoadedProfile, values: Values, person: Terminal) -> None:
+    """Show what would be written into the side file, and write it where the person agrees.
+
+    Args:
+        loaded: the profile.
+        values: by their keys.
+        person: who agrees.
+
+    Raises:
+        ConfigError: it cannot be written.
+        EOFError: nobody is there any more.
+    """
     from daemon.commissioning.dialogue import agrees, preview
+    from daemon.commissioning.session import changes_of
     from profiles.side_file import write_values
 
-    say(f"the side file of {path} gets:")
-    for line in preview(changes):
+    say(f"the side file of {loaded.path} gets:")
+    for line in preview(changes_of(loaded.profile, values)):
         say(line)
     if await agrees(person, "write it?"):
-        side = write_values(path, findings.values)
-        say(f"written into {side}; start the daemon anew")
+        say(f"written into {write_values(loaded.path, values)}; start the daemon anew")
     else:
         say("nothing was written")

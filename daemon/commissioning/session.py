@@ -9,7 +9,7 @@ from typing import Any
 from canhelm.errors import CanhelmError, NodeAbsent, Refused
 from daemon.commissioning.dialogue import Daemon, Person, agrees, preview, told
 from daemon.commissioning.pairs import follow_swapped_wheels, judge_brakes, judge_encoders, push_pairs
-from daemon.commissioning.wheels import Findings, look_at_wheels
+from daemon.commissioning.wheels import Findings, Values, look_at_wheels
 from profiles.schema import DriveConfig, PairedSteerGeometry, Profile
 
 ALL, PAIRS = "all", "pairs"
@@ -113,9 +113,9 @@ async def _read(daemon: Daemon, drive: str, name: str) -> int:
     return int((await daemon.call("sdo.read", node=drive, object=name))["value"])
 
 
-def changes_of(profile: Profile, findings: Findings) -> dict[str, tuple[Any, Any]]:
+def changes_of(profile: Profile, values: Values) -> dict[str, tuple[Any, Any]]:
     """What the side file changes: old and new value by dotted name."""
-    return {".".join(keys): (_value(profile, keys), new) for keys, new in findings.values.items()}
+    return {".".join(keys): (_value(profile, keys), new) for keys, new in values.items()}
 
 
 def _value(profile: Profile, keys: Sequence[str]) -> Any:

@@ -53,14 +53,14 @@ class Workshop:
 
 
 @asynccontextmanager
-async def workshop(profile: Path, built: Path | None = None) -> AsyncIterator[Workshop]:
+async def workshop(profile: Path, built: Path | None = None, *, lifted: bool = True) -> AsyncIterator[Workshop]:
     """A running daemon with a profile on a robot that may be built otherwise."""
     app = App(load(profile).profile, built=load(built).profile if built else None, seed=1)
     await app.start()
     shop = Workshop(app)
     try:
         await shop.robot.until(lambda: shop.robot.state == "idle")
-        await shop.call("simulation.lift", lifted=True)
+        await shop.call("simulation.lift", lifted=lifted)
         yield shop
     finally:
         await shop.robot.hang_up()
@@ -130,7 +130,7 @@ async def test_a_robot_that_is_built_as_its_profile_says_changes_nothing(tmp_pat
     async with workshop(robot_file(tmp_path)) as shop:
         findings = await shop.commission()
         assert (findings.wrong, findings.unsolved) == ([], [])
-        assert changes_of(shop.profile, findings) == {"setup": ("needed", "done")}
+        assert changes_of(shop.profile, findings.values) == {"setup": ("needed", "done")}
 
 
 async def test_a_robot_is_not_driven_before_its_setup(tmp_path: Path) -> None:
