@@ -28,14 +28,11 @@ def omni_kinematics(geometry: OmniGeometry) -> OmniKinematics:
 
 
 def omni_observer(profile: Profile, kinematics: OmniKinematics) -> SlipObserver | None:
-    """The observer of a profile's wheels; None where the profile answers no slip.
-
-    Without an accelerometer its currents have to do, and those come with synchronous PDOs only.
-    """
+    """The observer of a profile's wheels; None where the profile answers no slip, or readings come one by one."""
     traction, vehicle = profile.traction, profile.vehicle
-    by_currents = profile.accelerometer is None
-    if traction is None or not isinstance(vehicle, OmniGeometry) or (by_currents and not profile.network.synchronous):
+    if traction is None or not isinstance(vehicle, OmniGeometry) or not profile.network.synchronous:
         return None
+    by_currents = profile.accelerometer is None
     drives = [rim_drive(profile.drives[name], traction) for name in vehicle.wheels]
     body = Body(vehicle.mass_kg, vehicle.yaw_inertia_kg_m2)
     return SlipObserver(body, drives, kinematics.forward, tuning=BY_CURRENTS if by_currents else BY_ACCELEROMETER)

@@ -95,9 +95,9 @@ class PairedTraction:
 
 
 def rim_drives(profile: Profile) -> tuple[RimDrive, ...]:
-    """The drives of wheels 1 to 4; none where the profile answers no slip."""
+    """The drives of wheels 1 to 4; none where the profile answers no slip, or readings come one by one."""
     traction, vehicle = profile.traction, profile.vehicle
-    if traction is None or not isinstance(vehicle, PairedSteerGeometry):
+    if traction is None or not isinstance(vehicle, PairedSteerGeometry) or not profile.network.synchronous:
         return ()
     return tuple(rim_drive(profile.drives[name], traction) for name in vehicle.wheels)
 

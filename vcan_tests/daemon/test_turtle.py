@@ -261,6 +261,7 @@ async def test_it_drives_behind_a_serial_line() -> None:
     async with running_robot(TURTLE, bus="rs232") as robot:
         result = await robot.call("drive.to", x_m=0.6, y_m=-0.3, heading_deg=30.0)
         assert result["error_m"] < 0.02
+        assert not vehicle_of(robot).senses.observing
 
 
 async def test_one_motor_turns_by_itself() -> None:
