@@ -209,7 +209,7 @@ def _observer(world: SemitrailerWorld, plan: FollowedPath, motion: PathMotion, t
         trace.bending_rad.append(world.bending_rad)
         trace.steering_rad.append(world.steering.angle_rad)
         trace.speed_m_s.append(record.speed_m_s)
-        trace.limits.append(record.limits_active)
+        trace.limits.append(motion.limits_active)
         trace.way_m.append(way + abs(record.speed_m_s) * step_s)
 
     return look

@@ -237,26 +237,35 @@ def _check_joint(number: int, before: Piece, piece: Piece, lead_m: float) -> Non
         raise UsageError(message, object=where, value=kink, limit=MAX_KINK_RAD, remedy=remedy)
 
 
-def check_drivable(path: Path, forward_curvature: float, backward_curvature: float, run_out_m: float) -> None:
-    """Refuse a path that a vehicle cannot follow.
+def check_piece(number: int, piece: Piece, forward_curvature: float, backward_curvature: float) -> None:
+    """Refuse a piece that a vehicle cannot follow.
 
     Args:
-        path: to be driven.
+        number: of the piece in its path.
+        piece: to be driven.
         forward_curvature: highest that the vehicle holds when driving forwards [1/m].
-        backward_curvature: likewise backwards.
-        run_out_m: shortest section; a law that looks ahead needs at least its look-ahead.
+        backward_curvature: likewise backwards; 0 for a vehicle without a reverse gear.
 
     Raises:
-        LimitExceeded: a radius is too small or a section too short; ``object`` names the piece.
+        LimitExceeded: its radius is too small, or it is driven backwards and may not be; ``object`` names the piece.
     """
-    for number, piece in enumerate(path.pieces):
-        limit = backward_curvature if piece.backward else forward_curvature
-        if abs(piece.curvature) > limit:
-            way, where = "backwards" if piece.backward else "forwards", f"piece {number}"
-            message = (
-                f"{where} has a radius of {1 / abs(piece.curvature):.3f} m, the vehicle needs {1 / limit:.3f} m {way}"
-            )
-            raise LimitExceeded(message, object=where, value=piece.curvature, limit=limit, remedy="widen the arc")
+    limit, where = backward_curvature if piece.backward else forward_curvature, f"piece {number}"
+    if piece.backward and limit <= 0:
+        message = f"{where} is driven backwards, and the vehicle cannot"
+        raise LimitExceeded(message, object=where, remedy="lead the path round forwards")
+    if abs(piece.curvature) > limit:
+        radius, least = 1 / abs(piece.curvature), f"{1 / limit:.3f}"
+        way = "backwards" if piece.backward else "forwards"
+        message = f"{where} has a radius of {radius:.3f} m, the vehicle needs {least} m {way}"
+        raise LimitExceeded(message, object=where, value=round(radius, 4), limit=least, remedy="widen the arc")
+
+
+def check_run_out(path: Path, run_out_m: float) -> None:
+    """Refuse a path with a section that is shorter than ``run_out_m``: a law that looks ahead needs its look-ahead.
+
+    Raises:
+        LimitExceeded: ``object`` names the section's last piece.
+    """
     for section, (_, last) in enumerate(path.sections):
         length = path.section_length(section)
         if length < run_out_m:

@@ -16,7 +16,7 @@ class SpeedLimit(StrEnum):
 
     COMMAND = "commanded_speed"
     CURVATURE = "lateral_acceleration"
-    STEERING_RATE = "steering_rate"
+    STEERING = "speed_for_steering"
     ERROR = "path_error"
     APPROACH = "approach_to_end"
 
@@ -63,7 +63,7 @@ class PathSpeed:
         tuning = self._tuning
         top, reason = tuning.speed_m_s, SpeedLimit.COMMAND
         if step.backward and tuning.backward_m_s < top:
-            top, reason = tuning.backward_m_s, SpeedLimit.STEERING_RATE
+            top, reason = tuning.backward_m_s, SpeedLimit.STEERING
         off = abs(step.errors.position_m) / tuning.position_free_m
         off = max(1.0, off, abs(step.errors.heading_rad) / tuning.heading_free_rad)
         candidates = (

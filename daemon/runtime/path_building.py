@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from canhelm.errors import CanhelmError, UsageError
 from daemon.loops.odometry import Pose
-from daemon.loops.path import Path, Piece, check_drivable, join_waypoints
+from daemon.loops.path import Path, Piece, check_piece, check_run_out, join_waypoints
 from profiles.path_file import PathSpec, PieceSpec, Point
 
 PIECES_AT_A_TIME = 100
@@ -26,11 +26,15 @@ class PathBuilder:
         start: of the vehicle's reference point, with the vehicle's heading.
         lead_m: as for :class:`daemon.loops.path.Path`.
         exchanged: drive backward what the file says is driven forward, and the other way round.
+        forward_curvature, backward_curvature: as for :func:`daemon.loops.path.check_piece`.
     """
 
-    def __init__(self, start: Pose, lead_m: float = 0.0, exchanged: bool = False) -> None:
+    def __init__(
+        self, start: Pose, lead_m: float, exchanged: bool, forward_curvature: float, backward_curvature: float
+    ) -> None:
         self._x_m, self._y_m, self._heading_rad = start.x_m, start.y_m, start.yaw_rad
         self._lead_m, self._exchanged = lead_m, exchanged
+        self._curvatures = forward_curvature, backward_curvature
         self._backward = exchanged
         self._path: Path | None = None
         self._entry_of: list[int] = []
@@ -40,10 +44,12 @@ class PathBuilder:
         """Add one piece of the file.
 
         Raises:
-            UsageError, LimitExceeded: it is no piece, or does not join; ``object`` is its ``pieces[number]``.
+            UsageError: it is no piece, or does not join; ``object`` is its ``pieces[number]``.
+            LimitExceeded: it is more than the vehicle can do; likewise.
         """
         try:
             for piece in self._pieces(spec):
+                check_piece(len(self._entry_of), piece, *self._curvatures)
                 self._entry_of.append(self._entries)
                 if self._path is None:
                     self._path = Path([piece], self._lead_m)
@@ -54,12 +60,12 @@ class PathBuilder:
         self._entries += 1
         self._go_to_end()
 
-    def finished(self, forward_curvature: float, backward_curvature: float, run_out_m: float) -> Path:
-        """The path, checked against what the vehicle can do; arguments and errors as :func:`check_drivable`."""
+    def finished(self, run_out_m: float) -> Path:
+        """The path. Raises UsageError where it is empty, LimitExceeded as :func:`check_run_out`."""
         if self._path is None:
             raise UsageError("the path is empty", remedy="give it at least one line or arc")
         try:
-            check_drivable(self._path, forward_curvature, backward_curvature, run_out_m)
+            check_run_out(self._path, run_out_m)
         except CanhelmError as error:
             number = int((error.object or "piece 0").removeprefix("piece "))
             raise self._of_entry(error, self._entry_of[number]) from None
@@ -136,7 +142,8 @@ async def build_path(
         spec: what the file says.
         here: where the vehicle's reference point is: where a path without a start begins.
         lead_m, exchanged: as for :class:`PathBuilder`.
-        forward_curvature, backward_curvature, run_out_m: as for :func:`daemon.loops.path.check_drivable`.
+        forward_curvature, backward_curvature: as for :func:`daemon.loops.path.check_piece`.
+        run_out_m: shortest section.
 
     Raises:
         UsageError: the path is empty, a piece is none, or does not begin where the one before it ends.
@@ -144,9 +151,9 @@ async def build_path(
     """
     start = spec.start
     pose = here if start is None else Pose(start.x_m, start.y_m, math.radians(start.heading_deg))
-    builder = PathBuilder(pose, lead_m, exchanged)
+    builder = PathBuilder(pose, lead_m, exchanged, forward_curvature, backward_curvature)
     for number, piece in enumerate(spec.pieces, start=1):
         builder.add(piece)
         if number % PIECES_AT_A_TIME == 0:
             await asyncio.sleep(0)
-    return builder.finished(forward_curvature, backward_curvature, run_out_m)
+    return builder.finished(run_out_m)

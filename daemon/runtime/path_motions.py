@@ -54,6 +54,7 @@ class PathMotion(Motion):
 
     Attributes:
         record: of the last step; None before the first.
+        limits_active: in the last step: of the speed, of the steering law, of the steered axle.
         limits_s: for how long each limit was active.
         largest_error_m: of the position, while driving.
     """
@@ -61,6 +62,7 @@ class PathMotion(Motion):
     def __init__(self, lease: str | None, vehicle: FollowingVehicle, path: Path, driver: PathDriver) -> None:
         super().__init__(KIND, vehicle.names, lease)
         self.record: DrivingStep | None = None
+        self.limits_active: tuple[str, ...] = ()
         self.limits_s: defaultdict[str, float] = defaultdict(float)
         self.largest_error_m = 0.0
         self._vehicle, self._path, self._driver = vehicle, path, driver
@@ -72,18 +74,19 @@ class PathMotion(Motion):
         if self.stop_reason:
             self._driver.stop()
         record = self.record = self._driver.step(vehicle.reading, dt_s)
-        if record.phase is Phase.DRIVING:
-            self._note(record, dt_s)
         steering = self._axle.step(record.steering_rad, vehicle.reading.steering_rad, dt_s)
         if steering.failure:
             self._driver.fail(steering.failure)
+        self.limits_active = (*record.limits_active, *steering.limits_active)
+        if record.phase is Phase.DRIVING:
+            self._note(record, dt_s)
         if record.phase is Phase.DONE:
             self._end(record, measurement.time_s)
         speeds = vehicle.wheel_speeds(record.speed_m_s, vehicle.reading.steering_rad)
         return Command((*speeds, steering.rate_rad_s * vehicle.arm_m))
 
     def _note(self, record: DrivingStep, dt_s: float) -> None:
-        for limit in record.limits_active:
+        for limit in self.limits_active:
             self.limits_s[limit] += dt_s
         self.largest_error_m = max(self.largest_error_m, abs(record.following.errors.position_m))
 
@@ -128,7 +131,7 @@ class PathMotion(Motion):
             "bending_error_deg": None if bending is None else round(math.degrees(bending), 2),
             "speed_m_s": round(record.speed_m_s, 4),
             "steering_deg": round(math.degrees(record.steering_rad), 2),
-            "limits_active": list(record.limits_active),
+            "limits_active": list(self.limits_active),
         }
 
 
@@ -159,7 +162,7 @@ class FollowedPath(PathPlan):
             "begin": {
                 "x_m": round(first.x_m, 4),
                 "y_m": round(first.y_m, 4),
-                "heading_deg": round(math.degrees(first.heading(0.0)), 2),
+                "heading_deg": round(math.degrees(wrap(first.heading(0.0))), 2),
                 "backward": first.backward,
             },
             "law": "published" if self._published else "cascade",

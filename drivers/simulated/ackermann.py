@@ -127,9 +127,9 @@ class AckermannWorld(BodyWorld):
         self._free = (FreeWheel(simulation, radius), FreeWheel(simulation, radius))
         half, back, ahead = vehicle.track_m / 2, -vehicle.mass_offset_m, vehicle.wheelbase_m - vehicle.mass_offset_m
         places = ((back, half), (back, -half), (ahead, half), (ahead, -half))
+        rolling: tuple[WheelDrive | FreeWheel, ...] = (*drives.values(), *self._free)
         self.wheels = tuple(
-            CarWheel(x, y, rolling, Contact(simulation.tyre))
-            for (x, y), rolling in zip(places, (*drives.values(), *self._free), strict=True)
+            CarWheel(x, y, wheel, Contact(simulation.tyre)) for (x, y), wheel in zip(places, rolling, strict=True)
         )
         x, y, yaw = start
         centre = (x - back * cos(yaw), y - back * sin(yaw), yaw)

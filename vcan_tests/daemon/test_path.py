@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canhelm.errors import LimitExceeded, UsageError
-from daemon.loops.path import Meeting, Path, Piece, Point, arc, check_drivable, join_waypoints, line, wrap
+from daemon.loops.path import Meeting, Path, Piece, Point, arc, check_piece, check_run_out, join_waypoints, line, wrap
 
 CORNER = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0)]
 pieces = st.builds(
@@ -91,18 +91,26 @@ def test_a_piece_without_length_is_refused() -> None:
 def test_a_radius_too_small_is_named_with_its_piece() -> None:
     path = join_waypoints(CORNER, 0.5)
     with pytest.raises(LimitExceeded, match=r"piece 1 has a radius of 0\.500 m, the vehicle needs 0\.800 m forwards"):
-        check_drivable(path, 1.25, 5.0, 0.3)
+        check_piece(1, path.pieces[1], 1.25, 5.0)
 
 
 def test_a_section_too_short_is_named_with_its_last_piece() -> None:
     path = Path([line((0, 0), (1, 0)), line((1, 0), (0.8, 0), backward=True)])
     with pytest.raises(LimitExceeded, match=r"the end of piece 1 is 0\.200 m") as caught:
-        check_drivable(path, 1.0, 1.0, 0.425)
+        check_run_out(path, 0.425)
     assert caught.value.object == "piece 1"
 
 
+def test_a_vehicle_without_a_reverse_gear_drives_nothing_backwards() -> None:
+    with pytest.raises(LimitExceeded, match="piece 3 is driven backwards"):
+        check_piece(3, line((0, 0), (1, 0), backward=True), 1.0, 0.0)
+
+
 def test_a_good_path_passes() -> None:
-    check_drivable(join_waypoints(CORNER, 1.0), 1.0, 1.0, 0.425)
+    path = join_waypoints(CORNER, 1.0)
+    for number, piece in enumerate(path.pieces):
+        check_piece(number, piece, 1.0, 1.0)
+    check_run_out(path, 0.425)
 
 
 def test_waypoints_give_lines_and_rounded_corners() -> None:
@@ -190,7 +198,7 @@ def test_looking_ahead_goes_over_joints_and_beyond_the_sections_end() -> None:
 
 def test_a_path_of_a_hundred_thousand_pieces_is_an_ordinary_one() -> None:
     path = Path([line((n * 0.01, 0), (n * 0.01 + 0.01, 0)) for n in range(100_000)])
-    check_drivable(path, 1.0, 1.0, 0.425)
+    check_run_out(path, 0.425)
     assert path.section_length(0) == pytest.approx(1000)
     piece, way = path.ahead(0, 50_000, 0.425)
     assert piece.point(way) == pytest.approx((500.425, 0))

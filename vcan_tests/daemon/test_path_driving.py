@@ -103,7 +103,7 @@ def first_driving_step(errors: Errors, speed: SpeedTuning = SPEED, piece: Piece 
 
 @pytest.mark.parametrize("errors", [Errors(), Errors(position_m=0.24), Errors(heading_rad=math.radians(-19))])
 def test_errors_that_the_law_takes_back_do_not_lower_the_speed(errors: Errors) -> None:
-    assert first_driving_step(errors).speed_limit is SpeedLimit.STEERING_RATE
+    assert first_driving_step(errors).speed_limit is SpeedLimit.STEERING
 
 
 @pytest.mark.parametrize("errors", [Errors(position_m=0.4), Errors(heading_rad=math.radians(30))])

@@ -86,7 +86,7 @@ async def test_each_step_tells_which_limit_is_active() -> None:
 
         robot.app.supervisor.observers.append(look)
         result = await robot.call("drive.path", path=shipped("reverse"))
-        assert {"commanded_speed", "approach_to_end", "steering_rate"} <= seen
+        assert {"commanded_speed", "approach_to_end", "speed_for_steering", "steering_rate"} <= seen
         assert set(result["limits_s"]) <= seen
 
 
