@@ -38,9 +38,9 @@ async def straight(daemon: Daemon, person: Person, profile: Profile) -> Values:
 
 def _radii(profile: Profile) -> dict[tuple[str, ...], float]:
     """Radii of the wheels that carry the robot, by the keys of their drives or motors."""
-    radii: dict[tuple[str, ...], float] = {
-        ("drives", name): part.wheel_radius_m for name, part in profile.drives.items()
-    }
+    radii: dict[tuple[str, ...], float] = {}
+    for name, drive in profile.drives.items():
+        radii["drives", name] = drive.wheel_radius_m
     for brick, config in profile.bricks.items():
         for name, motor in config.motors.items():
             radii["bricks", brick, "motors", name] = motor.wheel_radius_m

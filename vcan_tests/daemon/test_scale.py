@@ -93,5 +93,5 @@ async def test_a_straight_too_short_to_measure_is_refused(tmp_path: Path) -> Non
 
 async def test_the_square_of_a_robot_that_turns_by_its_headings_is_refused(tmp_path: Path) -> None:
     async with workshop(robot_file(tmp_path), lifted=False) as shop:
-        with pytest.raises(Refused, match="of type paired_steer does not follow from its track"):
+        with pytest.raises(Refused, match="of type paired_steer turns does not follow from its track"):
             await square(shop, shop.person, shop.profile)
