@@ -79,6 +79,10 @@ class Run:
         settled = next((instant + 1 for instant in reversed(range(count)) if not near(instant)), 0)
         self.settle_m = self.way_m[settled] if settled < count else None
 
+    def settle_on_path(self) -> None:
+        """Near is within ``NEAR_M`` and ``NEAR_RAD`` of the path."""
+        self.settle(lambda i: abs(self.position_m[i]) <= NEAR_M and abs(self.heading_rad[i]) <= NEAR_RAD)
+
 
 def _largest(values: list[float]) -> float:
     return max(map(abs, values))
@@ -112,7 +116,7 @@ def drive(
         shown = (sign * errors.position_m, errors.heading_rad, errors.bending_rad or 0.0)
         run.add(_way(speed_m_s * period_s, instant), shown, step.steering_rad)
         plant.advance(speed, step.steering_rad, period_s)
-    run.settle(lambda i: abs(run.position_m[i]) <= NEAR_M and abs(run.heading_rad[i]) <= NEAR_RAD)
+    run.settle_on_path()
     return run
 
 

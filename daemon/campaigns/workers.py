@@ -13,18 +13,26 @@ from importlib.util import find_spec
 from typing import Final
 
 from canhelm.errors import CanhelmError, Timeout, UsageError
-from daemon.campaigns.cases import Case
+from daemon.campaigns.cases import Case, Outcome
 from daemon.campaigns.following_runs import ideal_run, outcome
 from daemon.campaigns.results import Result
 
-BATCH: Final = 8
+BATCH: Final = {"ideal": 8, "can": 1}
 """Runs that a worker is given at once; what a crash can lose of each."""
 DASK_PATIENCE_S: Final = 10.0
 
 
 def drive_batch(cases: Sequence[Case]) -> list[Result]:
     """Drive some cases, one after the other."""
-    return [(case, outcome(ideal_run(case))) for case in cases]
+    return [(case, _outcome(case)) for case in cases]
+
+
+def _outcome(case: Case) -> Outcome:
+    if case.through == "ideal":
+        return outcome(ideal_run(case))
+    from daemon.campaigns.can_runs import can_outcome
+
+    return can_outcome(case)
 
 
 def drive_all(cases: Sequence[Case], workers: int, dask: str | None = None) -> Iterator[list[Result]]:
@@ -40,7 +48,8 @@ def drive_all(cases: Sequence[Case], workers: int, dask: str | None = None) -> I
         Timeout: no scheduler answers.
         CanhelmError: a worker died.
     """
-    batches = [cases[begin : begin + BATCH] for begin in range(0, len(cases), BATCH)]
+    size = BATCH[cases[0].through] if cases else 1
+    batches = [cases[begin : begin + size] for begin in range(0, len(cases), size)]
     if dask is not None:
         yield from _on_dask(batches, dask)
     elif workers == 1:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Final, NamedTuple
 
 from daemon.loops.localisation import (
@@ -88,13 +88,19 @@ class PoseFilter:
         self._ways: deque[tuple[float, Pose]] = deque()
         self._unfit = 0
 
-    def move(self, odometry: Pose, time_s: float) -> None:
-        """The odometry, which goes on from the filter's pose, is at ``odometry`` now."""
+    def move(self, odometry: Pose, time_s: float, mounting: Pose) -> None:
+        """Follow the odometry.
+
+        Args:
+            odometry: where it says that the vehicle is; it goes on from the filter's pose.
+            time_s: now.
+            mounting: pose of the scanner in the vehicle's frame, now.
+        """
         step = composed(inverted(self.pose), odometry)
         dx, dy = odometry.x_m - self.pose.x_m, odometry.y_m - self.pose.y_m
         self.pose = odometry
         self._way = composed(self._way, step)
-        self._ways.append((time_s, self._way))
+        self._ways.append((time_s, composed(self._way, mounting)))
         while self._ways[0][0] < time_s - HISTORY_S:
             self._ways.popleft()
         way = math.hypot(dx, dy)
@@ -103,15 +109,14 @@ class PoseFilter:
             xx, xy, yy, xt, yt, tt = self.covariance.carried(dx, dy)
             self.covariance = Covariance(xx + across, xy, yy + across, xt, yt, tt + turn)
 
-    def take(self, scan: Sequence[SeenBearing], seen_s: float, mounting: Pose) -> Correction:
+    def take(self, scan: Sequence[SeenBearing], seen_s: float) -> Correction:
         """Correct the pose by a scan.
 
         Args:
             scan: its bearings; those that name an unknown reflector are rejected.
             seen_s: time at which it was taken.
-            mounting: pose of the scanner in the vehicle's frame, then.
         """
-        relative = composed(self._way_since(seen_s), mounting)
+        relative = composed(inverted(self._way), self._scanner_at(seen_s))
         before = self.pose
         used = 0
         if self.covariance is not None:
@@ -125,10 +130,17 @@ class PoseFilter:
         moved = math.hypot(self.pose.x_m - before.x_m, self.pose.y_m - before.y_m)
         return Correction(used, len(scan) - used, moved, fix is not None)
 
-    def _way_since(self, seen_s: float) -> Pose:
-        """Pose of the vehicle at a time, as seen from where it is now."""
-        then = next((way for time_s, way in reversed(self._ways) if time_s <= seen_s), self._way)
-        return composed(inverted(self._way), then)
+    def _scanner_at(self, seen_s: float) -> Pose:
+        """Where the scanner was at a time, in the frame of the odometry alone; of the last second."""
+        later_s, later = self._ways[-1]
+        for time_s, scanner in reversed(self._ways):
+            if time_s <= seen_s:
+                share = min(1.0, (seen_s - time_s) / (later_s - time_s)) if later_s > time_s else 0.0
+                return Pose(
+                    *(one + share * (two - one) for one, two in zip(astuple(scanner), astuple(later), strict=True))
+                )
+            later_s, later = time_s, scanner
+        return later
 
     def _correct(self, seen: SeenBearing, relative: Pose) -> bool:
         """Take one bearing, if it fits."""

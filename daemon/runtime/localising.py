@@ -83,7 +83,8 @@ class Localiser:
 
     def step(self) -> None:
         """Once a control cycle: follow the odometry."""
-        self.filter.move(self._odometry.pose, asyncio.get_running_loop().time())
+        pose = self._odometry.pose
+        self.filter.move(pose, asyncio.get_running_loop().time(), self._mounting(pose))
 
     def take(self, scan: Sequence[tuple[float, str | None]], age_s: float) -> Correction:
         """Correct the pose by a scan.
@@ -94,7 +95,7 @@ class Localiser:
         """
         now_s = asyncio.get_running_loop().time()
         self.step()
-        correction = self.filter.take([SeenBearing(*seen) for seen in scan], now_s - age_s, self._mounting())
+        correction = self.filter.take([SeenBearing(*seen) for seen in scan], now_s - age_s)
         self._odometry.pose = self.filter.pose
         self._scans += 1
         self._used, self._rejected = self._used + correction.used, self._rejected + correction.rejected
@@ -104,13 +105,12 @@ class Localiser:
             self._log.add("info", SOURCE, f"the pose is begun anew, {correction.moved_m:.3f} m from where it was")
         return correction
 
-    def _mounting(self) -> Pose:
+    def _mounting(self, pose: Pose) -> Pose:
         """Pose of the scanner in the frame of the vehicle's pose."""
         scanner = self._config.scanner
         mounted = Pose(scanner.x_m, scanner.y_m, math.radians(scanner.rotation_deg))
         if scanner.on == "vehicle" or not isinstance(self._vehicle, TowingVehicle):
             return mounted
-        pose = self.filter.pose
         trailer = self._vehicle.kinematics.poses(pose, self._vehicle.reading.bending_rad)[-1]
         return composed(composed(inverted(pose), trailer), mounted)
 

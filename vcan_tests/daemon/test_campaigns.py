@@ -14,7 +14,7 @@ import pytest
 
 from canhelm.errors import ConfigError, UsageError
 from daemon.campaigns import cases
-from daemon.campaigns.cases import Case, bounds_cases, following, thesis_states, tuning_cases
+from daemon.campaigns.cases import Case, State, bounds_cases, following, thesis_states, tuning_cases
 from daemon.campaigns.following_runs import ideal_run, outcome
 from daemon.campaigns.results import CSV, PARQUET, opened, write_parquet
 from daemon.campaigns.tables import BOUNDS, bending_table, bounds_table
@@ -189,7 +189,7 @@ def test_the_commands_print_tables_and_draw_pictures(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(cases, "RATES_DEG_M", ())
-    assert main(["campaign", "bounds", "--random", "2", "--workers", "1", "--out", str(tmp_path), "--json"]) == 0
+    assert main(["campaign", "bounds", "--random", "1", "--workers", "1", "--out", str(tmp_path), "--json"]) == 0
     found = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     summary = {(row["law"], row["steering"]): row for row in found if row.get("states") == "thesis"}
     assert summary["thesis", "60°/s"]["failed"] == 10
@@ -200,3 +200,17 @@ def test_the_commands_print_tables_and_draw_pictures(
 @pytest.mark.parametrize("option", [["--workers", "0"], ["--random", "0"], ["--through", "water"]])
 def test_senseless_options_are_refused(option: list[str], tmp_path: Path) -> None:
     assert main(["campaign", "bounds", "--out", str(tmp_path), *option]) == 2
+
+
+def test_through_can_the_whole_daemon_settles_on_the_line() -> None:
+    (case,) = following("thesis", [State("line", 0.1)], "cascade", 60.0, "can")
+    ((_, out),) = drive_batch([case])
+    assert out.ended == "driven"
+    assert out.settle_m is not None
+    assert out.settle_m < 1.5
+    assert out.worst_position_m < 0.11
+
+
+def test_a_run_through_can_is_the_same_every_time() -> None:
+    (case,) = following("thesis", [State("circle", heading_deg=5.0)], "cascade", 60.0, "can")
+    assert drive_batch([case]) == drive_batch([case])
