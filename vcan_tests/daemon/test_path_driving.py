@@ -149,3 +149,13 @@ def test_a_vehicle_that_is_elsewhere_may_not_begin() -> None:
     assert at_begin(SEMITRAILER, path, Pose(0.5), (0.0,)) == ""
     assert "1.00 m away" in at_begin(SEMITRAILER, path, Pose(), (0.0,))
     assert "180 degrees" in at_begin(SEMITRAILER, path, Pose(1.0, 0.0, math.pi), (0.0,))
+
+
+def test_the_published_laws_look_ahead_grows_with_the_speed_and_is_cut_at_the_end() -> None:
+    path, plant, ahead = Path([Piece(0.0, 0.0, 0.0, 4.0)]), fresh(), {}
+    for step in driven(PathDriver(SEMITRAILER, path, SPEED, RATE, published=True), plant):
+        target, along = step.following.target, step.following.meeting.along_m
+        assert target is not None
+        ahead[round(along, 1)] = target[0] - along
+    assert ahead[2.0] == pytest.approx(2 * 0.425, abs=0.01)
+    assert ahead[3.9] == pytest.approx(0.425 / 2, abs=0.02)
