@@ -25,6 +25,8 @@ for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIG
 if not COMMAND_IN_GUEST.exists():
     os.environ["CANHELM_ROBOTS"] = "/nonexistent"  # the robots of whoever runs the tests are not those that are tested
 
+os.environ["CANHELM_RUNS"] = "off"  # nor do tests leave runs with them
+
 NEEDS = {
     "vcan": [Path("/sys/class/net/vcan0"), Path("/sys/class/net/vcan1")],
     "systemd": [RUNNING_SYSTEMD, COMMAND_IN_GUEST],

@@ -102,6 +102,7 @@ async def running_robot(
     seed: int = 1,
     record: Path | None = None,
     runs: RunStore | None = None,
+    built: Profile | None = None,
     powered: bool = True,
     booted: bool = True,
     expect_errors: bool = False,
@@ -115,7 +116,7 @@ async def running_robot(
     """
     handler = _Collector()
     logging.getLogger().addHandler(handler)
-    app = App(profile or load("max2d").profile, bus, seed=seed, record=record, powered=powered, runs=runs)
+    app = App(profile or load("max2d").profile, bus, seed=seed, record=record, powered=powered, runs=runs, built=built)
     robot = Robot(app)
     before = asyncio.all_tasks()
     await app.start()

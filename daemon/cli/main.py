@@ -44,6 +44,8 @@ COMMANDS: dict[Group, dict[str, str]] = {
         "monitor": "daemon.cli.monitor:monitor",
         "doctor": "daemon.cli.doctor:doctor",
         "explain": "daemon.cli.explain:explain",
+        "runs": "daemon.cli.runs:runs",
+        "plot": "daemon.cli.plot:plot",
     },
     NETWORK: {
         "nodes": "daemon.cli.nodes:app",

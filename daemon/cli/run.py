@@ -21,6 +21,7 @@ from daemon.cli.output import say
 
 if TYPE_CHECKING:
     from daemon.app import App
+    from daemon.runs.store import RunStore
     from profiles.schema import Profile
 
 
@@ -39,6 +40,8 @@ def run(
     gateway_write: Annotated[bool, Parameter(negative=())] = False,
     bit_rate: int | None = None,
     miswire: str | None = None,
+    runs: str | None = None,
+    runs_mb: int = 200,
 ) -> int:
     """Run a robot's daemon in the foreground until Ctrl-C or SIGTERM; then it stops the vehicle and goes down.
 
@@ -61,6 +64,9 @@ def run(
         gateway_write: Let them write objects and command network states through the gateway's socket, too.
         bit_rate: Bit/s of a bus without a profile; the default is 1000000.
         miswire: Profile of how the simulated robot is really built and wired, to find it out by `canhelm setup`.
+        runs: Folder in which each motion leaves a run, or `off`; the default is the service's or the person's state
+            folder (~/.local/state/canhelm/NAME/runs).
+        runs_mb: What all runs may take; the oldest are deleted.
     """
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is not signal.SIG_IGN:
@@ -94,6 +100,7 @@ def run(
         gateway=GatewayAccess(gateway or path.with_suffix(protocol.GATEWAY_SUFFIX), gateway_tcp, gateway_write),
         inherited=inherited,
         built=load(miswire).profile if miswire else None,
+        runs=_store(runs, runs_mb, robot.name),
         profile_file=loaded.path.resolve() if loaded else None,
     )
     runner: Callable[[Coroutine[Any, Any, str]], str] = run_precise if simulates(chosen) else asyncio.run
@@ -118,6 +125,17 @@ def _unknown(bus: str, bit_rate: int | None) -> Profile:
         remedy = f"give {', '.join(map(str, sorted(CAN_BIT_RATES.values())))}"
         raise UsageError(f"{bit_rate} bit/s is no bit rate of an EPOS", value=bit_rate, remedy=remedy) from None
     return bench_profile(network)
+
+
+def _store(folder: str | None, megabytes: int, robot: str) -> RunStore | None:
+    """Where runs are kept. Raises UsageError for a size without room for any."""
+    from daemon.runs.store import OFF, RunStore, own_folder
+
+    if megabytes < 1:
+        raise UsageError("--runs-mb is below 1", value=megabytes, remedy="give megabytes, or --runs off")
+    if folder == OFF:
+        return None
+    return RunStore(Path(folder) if folder else own_folder(robot, os.environ), megabytes * 1_000_000)
 
 
 async def _live(make_app: Callable[[Profile], App], source: str | None, robot: Profile) -> str:

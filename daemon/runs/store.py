@@ -24,6 +24,8 @@ LIMIT_BYTES = 200_000_000
 RESERVE_BYTES = 50_000_000
 """What runs leave free on their disk for everything else."""
 LAST = "last"
+OFF = "off"
+"""In place of a folder: keep none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +155,9 @@ def all_folders(given: Path | None, environment: Mapping[str, str]) -> list[Path
 
 def read_runs(folders: Iterable[Path], robot: str | None = None) -> list[Run]:
     """All runs of some folders, oldest first; ``robot`` leaves those of others out."""
-    runs = [Run(int(path.name), path, _read_facts(path)) for folder in folders for path in RunStore(folder).folders()]
+    runs = [
+        Run(int(path.name), path, read_yaml(path / FACTS)) for folder in folders for path in RunStore(folder).folders()
+    ]
     return sorted((run for run in runs if robot in (None, run.robot)), key=lambda run: (run.begun, run.number))
 
 
@@ -184,9 +188,10 @@ def delete(run: Run) -> None:
         raise CanhelmError(f"run {run.number} cannot be deleted: {error.strerror}", remedy=remedy) from error
 
 
-def _read_facts(folder: Path) -> dict[str, Any]:
+def read_yaml(path: Path) -> dict[str, Any]:
+    """The mapping in a file; empty where the file is missing or damaged."""
     try:
-        facts = yaml.safe_load((folder / FACTS).read_text(encoding="utf-8"))
+        found = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, yaml.YAMLError):
         return {}
-    return facts if isinstance(facts, dict) else {}
+    return found if isinstance(found, dict) else {}

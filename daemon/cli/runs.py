@@ -1,0 +1,109 @@
+"""``canhelm runs``: what motions have left; list, show, delete."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import App, Parameter
+
+from canhelm.errors import UsageError
+from daemon.cli.output import Json, say, show
+from daemon.runs import store
+from daemon.runs.signs import read_signs
+from daemon.runs.store import LAST, OFF, PROFILE, Run
+from daemon.runs.table import read_table
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+runs = App(name="runs", help="Runs: each motion of a daemon leaves one. Without a further word: list them.")
+
+Folder = Annotated[str | None, Parameter(name="--runs", help="Folder of runs, as given to `canhelm run --runs`.")]
+Robot = Annotated[str | None, Parameter(help="Runs of this robot alone.")]
+"""Types of the options that choose among runs."""
+
+
+@runs.default
+def list_(*, folder: Folder = None, robot: Robot = None, json: Json = None) -> None:
+    """The runs that are kept, oldest first: when, of which robot, which motion, how long, how it ended, and its size.
+
+    Example: `canhelm runs`
+    """
+    found = find_runs(folder, robot)
+    if not found:
+        say("there are no runs yet: each motion of `canhelm run` leaves one")
+    show([summary(run) for run in found], _table, json)
+
+
+@runs.command(name="show")
+def show_(name: str = LAST, /, *, folder: Folder = None, robot: Robot = None, json: Json = None) -> None:
+    """One run: what was asked, how it ended, what stands out in its numbers, and where its files are.
+
+    Example: `canhelm runs show last`
+
+    Args:
+        name: Number of a run, or last.
+    """
+    run = store.choose(find_runs(folder, robot), name)
+    signs = read_signs(read_table(run), store.read_yaml(run.folder / PROFILE)) if run.facts.get("rows") else []
+    files = sorted(path.name for path in run.folder.iterdir())
+    shown = {"run": run.number, **run.facts, "size_bytes": run.size_bytes}
+    show({**shown, "stands_out": signs, "folder": str(run.folder), "files": files}, json=json)
+
+
+@runs.command
+def delete(*names: str, folder: Folder = None, robot: Robot = None) -> None:
+    """Delete runs for good.
+
+    Example: `canhelm runs delete 3 4`
+
+    Args:
+        names: Numbers of runs, last, or all.
+    """
+    found = find_runs(folder, robot)
+    if not names:
+        raise UsageError("which runs?", remedy="give numbers of `canhelm runs`, last, or all")
+    chosen = found if names == ("all",) else [store.choose(found, name) for name in names]
+    for run in chosen:
+        store.delete(run)
+        say(f"run {run.number} of {run.robot} is deleted")
+
+
+def find_runs(folder: str | None, robot: str | None) -> list[Run]:
+    """The runs among which a person chooses, oldest first. Raises UsageError or ConfigError."""
+    given = None if folder in (None, OFF) else Path(folder or "")
+    return store.read_runs(store.all_folders(given, os.environ), robot)
+
+
+def summary(run: Run) -> dict[str, Any]:
+    """One line of the list."""
+    facts = run.facts
+    return {
+        "run": run.number,
+        "begun": run.begun,
+        "robot": run.robot,
+        "vehicle": facts.get("vehicle"),
+        "motion": facts.get("motion"),
+        "duration_s": facts.get("duration_s"),
+        "ended": facts.get("ended"),
+        "message": facts.get("message", ""),
+        "size_bytes": run.size_bytes,
+    }
+
+
+def _table(rows: Sequence[Mapping[str, Any]]) -> Table:
+    from rich.table import Table
+    from rich.text import Text
+
+    grid = Table("run", "begun (UTC)", "robot", "vehicle", "motion", "s", "ended", "MB", box=None, header_style="bold")
+    for row in rows:
+        ended = str(row["ended"] or "not ended: it runs, or its daemon was killed")
+        told = f"{ended}: {row['message']}" if row["message"] else ended
+        duration = "-" if row["duration_s"] is None else f"{row['duration_s']:.1f}"
+        begun = str(row["begun"])[:19].replace("T", " ")
+        cells = [str(row["run"]), begun, str(row["robot"]), str(row["vehicle"] or "-"), str(row["motion"] or "-")]
+        grid.add_row(*map(Text, [*cells, duration, told, f"{row['size_bytes'] / 1e6:.1f}"]))
+    return grid

@@ -1,0 +1,137 @@
+"""The picture of a run: track, headings, speeds, currents, how the wheels keep to their speeds, and limits."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+
+from daemon.runs.signs import read_signs
+from daemon.runs.store import PROFILE, TERMS, Run, read_yaml
+from daemon.runs.table import Table, read_table
+
+mpl.use("Agg")
+from matplotlib import pyplot as plt
+
+COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
+"""Okabe and Ito's palette, which colour-blind people can tell apart."""
+SLIP = "slip, wheel {}"
+
+
+def draw(run: Run, path: Path) -> list[str]:
+    """Draw a run.
+
+    Args:
+        run: which one.
+        path: of the picture; its ending chooses the format.
+
+    Returns:
+        What stands out, as it is written into the picture.
+
+    Raises:
+        ConfigError: the run has no rows.
+        OSError: the picture cannot be written.
+        ValueError: the ending means no format.
+    """
+    table = read_table(run)
+    signs = read_signs(table, read_yaml(run.folder / PROFILE))
+    figure, axes = plt.subplots(3, 2, figsize=(14, 12), layout="constrained")
+    figure.suptitle(_title(run, signs))
+    _track(axes[0][0], table)
+    _lines(axes[0][1], table, table.of("heading_deg"), "steering headings, by their encoders", "heading [°]")
+    _speeds(axes[1][0], table)
+    _lines(axes[1][1], table, _deviations(table), "measured minus commanded speed", "rim speed [m/s]")
+    _lines(axes[2][0], table, table.of("current_a"), "motor currents (positive: pushes forward)", "current [A]")
+    _active(axes[2][1], table, {**table.limits(), **_slips(run)})
+    try:
+        figure.savefig(path, dpi=90)
+    finally:
+        plt.close(figure)
+    return signs
+
+
+def _title(run: Run, signs: list[str]) -> str:
+    facts = run.facts
+    ended = str(facts.get("ended", "not ended"))
+    if facts.get("message"):
+        ended = f"{ended}: {facts['message']}"
+    lines = [f"run {run.number} of {run.robot}: {facts.get('motion')}, {run.begun}, {ended}", *signs]
+    return "\n".join(part for line in lines for part in textwrap.wrap(line, 130))
+
+
+def _track(axes: Any, table: Table) -> None:
+    x, y = table.numbers["x_m"], table.numbers["y_m"]
+    axes.plot(x, y, color="black")
+    axes.plot(x[:1], y[:1], "o", color="black", label="begin")
+    axes.plot(x[-1:], y[-1:], "x", color="red", markersize=10, label="end")
+    axes.set(title="track, by odometry", xlabel="x [m]", ylabel="y [m]")
+    axes.axis("equal")
+    _finish(axes)
+
+
+def _speeds(axes: Any, table: Table) -> None:
+    _lines(axes, table, table.of("speed_m_s"), "wheel speeds (dashed: commanded)", "rim speed [m/s]")
+    for number, column in enumerate(table.of("commanded_m_s").values()):
+        axes.plot(table.time_s, column, "--", color=_colour(number), linewidth=0.8)
+
+
+def _deviations(table: Table) -> dict[str, list[float]]:
+    commanded = table.of("commanded_m_s")
+    return {
+        name: [is_ - asked for is_, asked in zip(column, commanded[name], strict=True)]
+        for name, column in table.of("speed_m_s").items()
+    }
+
+
+def _lines(axes: Any, table: Table, columns: Mapping[str, list[float]], title: str, label: str) -> None:
+    for number, (name, column) in enumerate(columns.items()):
+        axes.plot(table.time_s, column, color=_colour(number), label=name)
+    axes.set(title=title, xlabel="time [s]", ylabel=label)
+    _finish(axes)
+
+
+def _active(axes: Any, table: Table, times: Mapping[str, list[float]]) -> None:
+    for row, when in enumerate(times.values()):
+        axes.plot(when, [row] * len(when), "|", color=_colour(row), markersize=14)
+    axes.set_yticks(range(len(times)), list(times))
+    axes.set_xlim(table.time_s[0], table.time_s[-1] or 1.0)
+    axes.set_ylim(-0.5, max(len(times), 1) - 0.5)
+    axes.set(title="active limits and slip" if times else "no limit was active, no slip detected", xlabel="time [s]")
+    axes.grid(visible=True, alpha=0.3)
+
+
+def _slips(run: Run) -> dict[str, list[float]]:
+    """When the law detected slip, by wheel [s]; laws that detect none have no such term."""
+    times: dict[str, list[float]] = {}
+    for time_s, terms in _terms(run):
+        for wheel, slips in enumerate(terms.get("guidance", terms).get("slip") or ()):
+            if slips:
+                times.setdefault(SLIP.format(wheel + 1), []).append(time_s)
+    return times
+
+
+def _terms(run: Run) -> Iterator[tuple[float, dict[str, Any]]]:
+    try:
+        lines = (run.folder / TERMS).read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return
+    for line in lines:
+        try:
+            step = json.loads(line)
+        except ValueError:
+            continue  # the last line of a daemon that was killed
+        yield step["time_s"], step["terms"]
+
+
+def _finish(axes: Any) -> None:
+    axes.grid(visible=True, alpha=0.3)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(fontsize="small")
+
+
+def _colour(number: int) -> str:
+    return COLOURS[number % len(COLOURS)]

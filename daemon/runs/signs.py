@@ -1,0 +1,77 @@
+"""What the numbers of a run say about the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from statistics import fmean, median
+from typing import Any
+
+from daemon.runs.table import Table
+
+EQUAL_M_S = 1e-3
+"""Wheels whose commanded speeds differ less run side by side: nothing but their sizes sets them against each other."""
+MOVING_M_S = 0.05
+SETTLING_S = 0.5
+"""After the begin of equal speeds, until currents are steady."""
+SHORTEST_S = 0.5
+OUTLIER_SHARE = 0.25
+"""Of the continuous current, by which a wheel's current stands out from the others'."""
+FEWEST_WHEELS = 3
+
+
+def side_by_side(table: Table) -> list[int]:
+    """Rows in which all wheels have rolled at one constant commanded speed for a while."""
+    commanded = list(table.of("commanded_m_s").values())
+    rows: list[int] = []
+    since_s, before = table.time_s[0], 0.0
+    for row, time_s in enumerate(table.time_s):
+        speeds = [column[row] for column in commanded]
+        equal = max(speeds) - min(speeds) < EQUAL_M_S and abs(speeds[0]) > MOVING_M_S
+        if not equal or abs(speeds[0] - before) > EQUAL_M_S:
+            since_s = time_s
+        elif time_s - since_s > SETTLING_S:
+            rows.append(row)
+        before = speeds[0]
+    return rows
+
+
+def mean_currents_a(table: Table, rows: list[int]) -> dict[str, float]:
+    """Mean current of each wheel, positive where the motor pushes into the direction of travel."""
+    commanded = table.of("commanded_m_s")
+    return {
+        name: fmean(column[row] if commanded[name][row] > 0 else -column[row] for row in rows)
+        for name, column in table.of("current_a").items()
+    }
+
+
+def read_signs(table: Table, profile: Mapping[str, Any]) -> list[str]:
+    """What stands out, one sentence each.
+
+    Wheels that roll side by side on one body share the load. A wheel that is larger than the profile says is turned too
+    fast for the body: it pushes, and the others hold it back; one that is too small is dragged. The drive keeps the
+    speed of its motor either way, so that it is the currents that tell.
+
+    Args:
+        table: of the run.
+        profile: the run's own.
+    """
+    rows = side_by_side(table)
+    if len(table.wheels) < FEWEST_WHEELS or not rows:
+        return []
+    if table.time_s[rows[-1]] - table.time_s[rows[0]] < SHORTEST_S:
+        return []
+    currents = mean_currents_a(table, rows)
+    away = {name: current - _others(currents, name) for name, current in currents.items()}
+    name = max(away, key=lambda wheel: abs(away[wheel]))
+    continuous_a = float(profile["drives"][name]["continuous_current_a"])
+    if abs(away[name]) < OUTLIER_SHARE * continuous_a:
+        return []
+    does, size = ("pushes", "larger") if away[name] > 0 else ("is dragged", "smaller")
+    return [
+        f"{name} {does}: {currents[name]:+.2f} A, the other wheels {_others(currents, name):+.2f} A at the same speed; "
+        f"its wheel is {size} than the profile's wheel_radius_m says, or its gear ratio or encoder pulses are wrong"
+    ]
+
+
+def _others(currents: Mapping[str, float], name: str) -> float:
+    return median(current for wheel, current in currents.items() if wheel != name)
