@@ -1,4 +1,4 @@
-"""Pictures of the Turtle's demo: acceleration, safety factor, case and velocity over time, as in its report."""
+"""Pictures of the Turtle's demo: acceleration, safety factor, case and velocity as in its report; ice from above."""
 
 from __future__ import annotations
 
@@ -9,12 +9,16 @@ import matplotlib as mpl
 import numpy as np
 
 from daemon.demo_turtle import TurtleResult
+from profiles.schema import FloorPatch
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
+from matplotlib.patches import Rectangle
 
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7")
 """Okabe and Ito's palette, which colour-blind people can tell apart."""
+HEADING_EVERY = 15
+"""Cycles between two headings that are drawn."""
 
 
 def draw(result: TurtleResult, folder: Path) -> Path:
@@ -30,7 +34,12 @@ def draw(result: TurtleResult, folder: Path) -> Path:
     _error(axes[0], result)
     _acceleration(axes[1], result)
     _factor(axes[2], result)
-    _case(axes[3], result)
+    if result.figure.ice is None:
+        _case(axes[3], result)
+    else:
+        place = axes[3].get_subplotspec()
+        axes[3].remove()
+        _way(figure.add_subplot(place), result, result.figure.ice)
     _velocity(axes[4], result)
     axes[4].set_xlabel("time [s]")
     path = folder / f"figure-{result.figure.identity}.png"
@@ -74,6 +83,22 @@ def _case(axes: Any, result: TurtleResult) -> None:
     axes.step(result.track.time_s, [names.index(case) for case in result.track.case], where="post", color=COLOURS[3])
     axes.set(title="case (x/y where there are two)", yticks=range(len(names)), yticklabels=names)
     axes.grid(visible=True, alpha=0.3)
+
+
+def _way(axes: Any, result: TurtleResult, ice: FloorPatch) -> None:
+    """From above: the ice, the line to the goal, and where the robot truly went, with its heading."""
+    corner = ice.x_m - ice.length_m / 2, ice.y_m - ice.width_m / 2
+    axes.add_patch(Rectangle(corner, ice.length_m, ice.width_m, color=COLOURS[0], alpha=0.15, label="ice"))
+    x, y, yaw = np.array(result.track.pose).T
+    axes.plot(
+        *zip((0.0, 0.0), result.figure.goal_m, strict=True), "--", color="black", linewidth=1, label="to the goal"
+    )
+    axes.plot(x, y, color=COLOURS[1], label="true way")
+    some = slice(None, None, HEADING_EVERY)
+    axes.quiver(x[some], y[some], np.cos(yaw[some]), np.sin(yaw[some]), color=COLOURS[1], scale=40, width=0.003)
+    axes.set(title="from above", xlabel="x [m]", ylabel="y [m]", aspect="equal")
+    axes.grid(visible=True, alpha=0.3)
+    axes.legend(fontsize="small")
 
 
 def _velocity(axes: Any, result: TurtleResult) -> None:
