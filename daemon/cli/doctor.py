@@ -240,7 +240,8 @@ def _counts_trouble(key: str, value: Any) -> bool:
 
 
 def _node_finding(node: Mapping[str, Any]) -> Finding:
-    name = f"node {node.get('node')} ({node.get('name')})"
+    on_can = node.get("node") is not None
+    name = f"node {node['node']} ({node.get('name')})" if on_can else str(node.get("name"))
     fault = node.get("fault")
     if isinstance(fault, Mapping):
         return Finding(name, "problem", str(fault.get("message")), str(fault.get("remedy") or "canhelm reset"))
@@ -250,7 +251,8 @@ def _node_finding(node: Mapping[str, Any]) -> Finding:
     if node.get("node_state") == "configuring":
         return Finding(name, "note", f"is being configured: {told.removeprefix(f'{name}: ')}")
     if node.get("node_state") != "ready":
-        return Finding(name, "problem", told, "switch motor power on, and check the cable and the node id")
+        mend = "switch motor power on, and check the cable and the node id" if on_can else "switch the NXT brick on"
+        return Finding(name, "problem", told, mend)
     return Finding(name, "ok", f"{node.get('node_state')}, {node.get('state', 'reading')}")
 
 

@@ -30,7 +30,7 @@ class Driving:
     tolerance_deg: float | None = None
     """Under feedback: degrees of heading that count as there (1)."""
     timeout: float | None = None
-    """Under feedback: seconds after which a goal is given up (30)."""
+    """Under feedback: seconds after which a goal is given up (30, and twice as long as the way takes)."""
     gains: Literal["slow", "report"] = "slow"
     """Under feedback: gains for cycles as slow as Bluetooth, or those of the NXT report."""
     speed: float | None = None

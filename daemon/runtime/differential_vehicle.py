@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -22,6 +23,8 @@ from profiles.schema import Profile
 
 GAINS = {"slow": SLOW_CYCLE_GAINS, "report": REPORT_GAINS}
 TOLERANCE_M, TOLERANCE_DEG, TIMEOUT_S = 0.002, 1.0, 30.0
+FARTHEST_DEG = 1e8
+"""A brick counts to 2^31."""
 _ROUNDING = 1e-9
 
 
@@ -94,10 +97,10 @@ class DifferentialVehicle(Vehicle):
             remedy = f"ask for at most {limit:g} m/s"
             message = f"a speed of {speed:g} m/s is beyond the limit"
             raise LimitExceeded(message, value=speed, limit=f"speed_m_s {limit:g}", remedy=remedy)
-        reach = params.get("tolerance_m") or TOLERANCE_M
+        reach, longest_m = params.get("tolerance_m") or TOLERANCE_M, _longest_m([self.odometry.pose, *goals])
         settings = SeekSettings(
             Tolerance(reach, reach, math.radians(params.get("tolerance_deg") or TOLERANCE_DEG)),
-            timeout_s=params.get("timeout_s") or TIMEOUT_S,
+            timeout_s=params.get("timeout_s") or TIMEOUT_S + 2 * longest_m / (speed or limit),
             wheel_limit_rad_s=(speed or limit) / self._drive.wheel_radius_m,
             gains=GAINS[params.get("gains") or "slow"],
         )
@@ -114,18 +117,22 @@ class DifferentialVehicle(Vehicle):
         power = float(params.get("power") or self._slow_power())
         self._check_power(power)
         try:
-            if method == "nxt.line":
-                return [line(self._drive, float(params["distance_m"]), power)]
-            if method == "nxt.bend":
-                signed = -power if params.get("backward") else power
-                angle = math.radians(params["angle_deg"])
-                return [bend(self._drive, float(params["radius_m"]), angle, signed, params.get("side") == "right")]
-            if method == "nxt.goto":
-                return way_to(self._drive, _pose(params, 0.0), power)
-            return [parse_move(self._drive, text, power) for text in params["moves"]]
+            return _possible(self._wanted(method, params, power))
         except ValueError as error:
             remedy = "moves are as `line 0.5`, `line -0.2`, `bend 0.2 90`, `bend 0.2 90 right back`"
             raise UsageError(f"{method}: {error}", remedy=remedy) from error
+
+    def _wanted(self, method: str, params: dict[str, Any], power: float) -> list[Move]:
+        """Moves, one or several. Raises ValueError."""
+        if method == "nxt.line":
+            return [line(self._drive, float(params["distance_m"]), power)]
+        if method == "nxt.bend":
+            signed = -power if params.get("backward") else power
+            angle = math.radians(params["angle_deg"])
+            return [bend(self._drive, float(params["radius_m"]), angle, signed, params.get("side") == "right")]
+        if method == "nxt.goto":
+            return way_to(self._drive, _pose(params, 0.0), power)
+        return [parse_move(self._drive, str(text), power) for text in params["moves"]]
 
     def _slow_power(self) -> int:
         """Power at the speed that the vehicle may have, rounded down to tens."""
@@ -171,10 +178,24 @@ class DifferentialVehicle(Vehicle):
         }
 
 
+def _longest_m(poses: Sequence[Pose]) -> float:
+    """Distance of those two that are farthest apart of those that follow each other."""
+    return max(math.hypot(b.x_m - a.x_m, b.y_m - a.y_m) for a, b in itertools.pairwise(poses))
+
+
 def _pose(params: dict[str, Any], heading_deg: float) -> Pose:
     given = params.get("heading_deg")
     yaw = math.radians(heading_deg if given is None else given)
     return Pose(float(params["x_m"]), float(params["y_m"]), yaw)
+
+
+def _possible(moves: list[Move]) -> list[Move]:
+    """Moves whose angles the brick can count. Raises ValueError."""
+    if not moves:
+        raise ValueError("there is no move")
+    if any(abs(leg.angle_deg) > FARTHEST_DEG for move in moves for leg in move):
+        raise ValueError("a wheel would turn too far")
+    return moves
 
 
 def _brick_wheels(wheels: tuple[Drive, Drive]) -> BrickWheels | None:

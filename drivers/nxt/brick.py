@@ -24,9 +24,8 @@ from drivers.nxt import replies, requests
 from drivers.nxt.codes import Output, OutputMode, Regulation, RunState
 from drivers.nxt.layout import Telegram
 from drivers.nxt.line import REPLY_TIMEOUT_S, BrickLine, Port
+from drivers.nxt.power import FULL_SPEED_DEG_S, move_order
 
-FULL_SPEED_DEG_S: Final = 1000.0
-"""Speed that the brick regulates to at power 100 (LEGO firmware)."""
 PUSHED_DEG: Final = 3
 """A motor that has turned farther since it came to rest was turned by somebody."""
 REST_TIMEOUT_S: Final = 3.0
@@ -60,14 +59,6 @@ class BrickSettings:
     warn_v: float = 6.9
     refuse_v: float = 6.3
     reach_s: float = 0.8
-
-
-def regulated_power(speed_rad_s: float) -> int:
-    """The power at which the brick regulates to a speed; the least one where rounding would make none of it."""
-    if speed_rad_s == 0:
-        return 0
-    power = round(100 * math.degrees(speed_rad_s) / FULL_SPEED_DEG_S)
-    return max(-100, min(100, power)) or int(math.copysign(1, speed_rad_s))
 
 
 class Brick:
@@ -345,7 +336,7 @@ class Brick:
         self.require_battery()
         if self.moving:
             raise NotReady(f"the motors of {self.name} are in the middle of a move", remedy="wait for it, or stop it")
-        orders = {port: _order(power, angle) for port, (power, angle) in legs.items() if round(angle)}
+        orders = {port: move_order(power, angle) for port, (power, angle) in legs.items() if round(angle)}
         if timeout_s is None:
             timeout_s = 3 + 2 * max((limit / abs(power) / 10 for power, limit in orders.values()), default=0.0)
         self._still.clear()
@@ -396,11 +387,3 @@ class Brick:
             f"motors {names} of {self.name} did not arrive in {timeout_s:.1f} s and were stopped",
             remedy="is something in the way, is every motor plugged in, and is the battery charged?",
         )
-
-
-def _order(power: float, angle_deg: float) -> tuple[int, int]:
-    """Power with the direction's sign, and the tacho limit, which has none. Raises ValueError."""
-    if power == 0:
-        raise ValueError(f"at power 0 a motor never turns {angle_deg} degrees")
-    size = max(1, min(100, round(abs(power))))
-    return (size if angle_deg > 0 else -size), abs(round(angle_deg))

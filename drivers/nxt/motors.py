@@ -13,8 +13,9 @@ from typing import Any, Final
 
 from canhelm.errors import CanhelmError, Refused
 from drivers.contract import DriveState, Fault, NodeState
-from drivers.nxt.brick import Brick, regulated_power
+from drivers.nxt.brick import Brick
 from drivers.nxt.codes import Output
+from drivers.nxt.power import regulated_power
 from drivers.nxt.replies import OutputState
 from profiles.bricks import NxtMotorConfig
 

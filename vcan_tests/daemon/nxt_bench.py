@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from daemon.loops.differential import DifferentialDrive, Move, wrap_angle
 from daemon.loops.odometry import Pose
 from daemon.loops.pose_feedback import AlignedTurns, GearPlay, GoalSeeker, Phase, SeekSettings, Tolerance
-from drivers.nxt.brick import Brick, Legs, regulated_power
+from drivers.nxt.brick import Brick, Legs
 from drivers.nxt.codes import Output
+from drivers.nxt.power import regulated_power
 from drivers.simulated.nxt_link import SimulatedLink
 from drivers.simulated.nxt_robot import REPORT_ROBOT, NxtRobotConstants, SimulatedNxtRobot
 

@@ -102,6 +102,12 @@ def test_a_node_that_is_being_configured_is_a_note_of_how_far_it_is() -> None:
     assert found.finding == "is being configured: writing its limits and ramps"
 
 
+def test_a_brick_that_is_away_is_named_without_a_node_id_and_to_be_switched_on() -> None:
+    node = {"node": None, "name": "right", "node_state": "absent", "status": "brick nxt: no brick in reach"}
+    found = findings(state="waiting", nodes=[node])["right"]
+    assert (found.verdict, found.mend) == ("problem", "switch the NXT brick on")
+
+
 def test_an_emergency_stop_is_a_problem() -> None:
     assert findings(state="estop", message="emergency stop: by a person")["vehicle"].verdict == "problem"
 

@@ -28,6 +28,15 @@ bricks:
     motors:
       gripper: {output: A, wheel_radius_m: 0.01, max_speed_m_s: 0.1, quick_stop_m_s2: 1.0}
 """
+TWO_EPOS = """
+schema_version: 1
+drives:
+  right: {extends: devices/turtle_wheel_drive, node: 1}
+  left: {extends: devices/turtle_wheel_drive, node: 2}
+vehicle: {type: differential, half_track_m: 0.2, wheels: [right, left]}
+limits: {speed_m_s: 0.3, acceleration_m_s2: 1.0, wheel_speed_m_s: 0.5}
+simulation: {extends: supply}
+"""
 SUPPLY = """
 supply_voltage_v: 24
 wheel_inertia_kg_m2: 0.0005
@@ -84,6 +93,17 @@ async def test_losing_one_of_them_in_motion_stops_the_other(gripper: Profile, pa
             with pytest.raises(CanhelmError):
                 await task
         await robot.until(lambda: robot.speed_m_s < 0.01 and not turning(robot, "hand"), timeout_s=5.0)
+
+
+async def test_two_wheels_on_can_are_driven_by_the_same_law(tmp_path: Path) -> None:
+    """On a stand: where the robot would be is known by its wheels alone."""
+    (tmp_path / "supply.yaml").write_text(SUPPLY)
+    (tmp_path / "lab.yaml").write_text(TWO_EPOS)
+    async with running_robot(load(tmp_path / "lab.yaml").profile, seed=3) as robot:
+        result = await robot.call("drive.to", x_m=0.5, y_m=0.2, heading_deg=90.0)
+        assert result["error_m"] < 0.004
+        assert abs(result["heading_error_deg"]) < 3.0
+        assert robot.app.vehicle.methods == ("drive.to",)
 
 
 async def test_a_robot_waits_for_its_brick(gripper: Profile) -> None:

@@ -8,9 +8,10 @@ import pytest
 from canhelm.errors import Aborted, BusOff, NodeAbsent, NotReady, Refused, Timeout
 from drivers.contract import NodeState
 from drivers.nxt import replies, requests
-from drivers.nxt.brick import Brick, BrickSettings, regulated_power
+from drivers.nxt.brick import Brick, BrickSettings
 from drivers.nxt.codes import Output, RunState
 from drivers.nxt.line import QUEUE_DEPTH, BrickLine
+from drivers.nxt.power import regulated_power
 from drivers.nxt.telegrams import make_frame
 from drivers.simulated.nxt import SimulatedNxt
 from drivers.simulated.nxt_link import LinkEnd, SimulatedLink
