@@ -35,6 +35,8 @@ TYPED = (
     ("drive turn --rear -4 --front 4 --speed 0.3 --duration 0.5", 0, "201#0F00"),
     ("drive rotate 20", 1, ""),
     ("drive to 1 0", 1, ""),
+    ("drive heading 5 --speed 0.2 --duration 0.3", 1, ""),
+    ("drive path line --dry-run", 0, ""),
     ("stop", 0, ""),
     ("estop", 0, ""),
     ("steer front 0", 6, ""),
@@ -61,6 +63,19 @@ TYPED = (
     ("config restore {folder}/settings 1 --yes", 0, ""),
     ("sim power 3 off", 1, ""),
     ("sim input 3 1 low", 1, ""),
+    ("sim turn front 5", 1, ""),
+    ("sim lift on", 1, ""),
+    ("sim hand front_left 10", 1, ""),
+    ("sim look", 1, ""),
+    ("encoder status front", 0, ""),
+    ("encoder zero front --yes", 0, "606#40046000"),
+    ("nxt line 0.1", 1, ""),
+    ("nxt bend 0.1 0.1", 1, ""),
+    ("nxt goto 0.1 0.1", 1, ""),
+    ("nxt moves", 1, ""),
+    ("nxt stop", 0, ""),
+    ("nxt battery", 1, ""),
+    ("nxt info", 1, ""),
 )
 """What is typed, in this order, its exit code, and the beginning of a frame that it brings."""
 
@@ -90,8 +105,18 @@ def test_the_monitor_shows_one_status_after_the_other_until_ctrl_c(robot: Bench)
     assert (states, monitor.returncode) == (["max2d"] * 3, 130)
 
 
+def test_a_drive_is_recorded_until_ctrl_c(robot: Bench) -> None:
+    path = robot.profile.with_name("driven.csv")
+    recording = robot.daemon.begin("drive", "record", str(path))
+    assert recording.stderr is not None
+    assert "Ctrl-C" in recording.stderr.readline()
+    recording.send_signal(signal.SIGINT)
+    recording.communicate(timeout=30)
+    assert path.exists()
+
+
 def test_no_command_that_needs_a_daemon_is_left_out() -> None:
-    tested = {typed.partition(" -")[0] for typed, _, _ in TYPED} | {"monitor"}
+    tested = {typed.partition(" -")[0] for typed, _, _ in TYPED} | {"monitor", "drive record"}
     missing = [verb for verb in verbs_for_a_daemon(build_app()) if not any(line.startswith(verb) for line in tested)]
     assert missing == []
 
