@@ -15,7 +15,7 @@ from daemon.loops.path import Path as Way
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 
-COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7")
+COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9")
 """Okabe and Ito's palette, which colour-blind people can tell apart."""
 OUTLINES = 6
 POINT_M = 0.02

@@ -21,7 +21,7 @@ from canhelm.errors import ConfigError
 from drivers.simulated.body import GRAVITY_M_S2, BodyWorld
 from drivers.simulated.floor import Floor
 from drivers.simulated.motor import WheelDrive
-from drivers.simulated.tyre import DAMPING_S, Contact
+from drivers.simulated.tyre import DAMPING_S, Contact, require_soft
 from drivers.simulated.wheel_pair import Pair, Wheel
 from drivers.simulated.world import STEP_S
 from profiles.schema import PairedSteerGeometry, Profile, SimulationConfig
@@ -209,14 +209,7 @@ def _check_stiffness(
     tyre = simulation.tyre
     load = vehicle.mass_kg * GRAVITY_M_S2 / 4.0
     least = tyre.cornering_stiffness_per_rad * load / stiffest
-    if tyre.relaxation_length_m < least:
-        raise ConfigError(
-            f"the simulated tyres are too stiff for steps of {1000.0 * step_s:g} ms",
-            object="simulation.tyre.relaxation_length_m",
-            value=tyre.relaxation_length_m,
-            limit=least,
-            remedy=f"set a relaxation length of at least {least:.4f} m, or a smaller cornering stiffness",
-        )
+    require_soft(tyre, least, step_s)
 
 
 def _check_tipping(vehicle: PairedSteerGeometry, simulation: SimulationConfig) -> None:

@@ -20,7 +20,7 @@ from drivers.simulated.body import GRAVITY_M_S2, BodyWorld
 from drivers.simulated.floor import Floor
 from drivers.simulated.motor import WheelDrive
 from drivers.simulated.roller_wheel import RollerWheel
-from drivers.simulated.tyre import DAMPING_S
+from drivers.simulated.tyre import DAMPING_S, require_soft
 from drivers.simulated.world import STEP_S
 from profiles.schema import OmniGeometry, Profile, SimulationConfig
 
@@ -198,11 +198,4 @@ def _check_stiffness(profile: Profile, vehicle: OmniGeometry, simulation: Simula
     )
     tyre, load = simulation.tyre, vehicle.mass_kg * GRAVITY_M_S2 / wheels
     least = tyre.slip_stiffness * load * (rim + body) * step_s * (step_s + 2.0 * DAMPING_S) / 3.0
-    if tyre.relaxation_length_m < least:
-        raise ConfigError(
-            f"the simulated tyres are too stiff for steps of {1000.0 * step_s:g} ms",
-            object="simulation.tyre.relaxation_length_m",
-            value=tyre.relaxation_length_m,
-            limit=least,
-            remedy=f"set a relaxation length of at least {least:.4f} m, or a smaller slip stiffness",
-        )
+    require_soft(tyre, least, step_s)

@@ -25,7 +25,7 @@ from canhelm.errors import ConfigError
 from drivers.simulated.body import GRAVITY_M_S2, BodyWorld
 from drivers.simulated.motor import WheelDrive
 from drivers.simulated.steered_axle import SimulatedSteering
-from drivers.simulated.tyre import DAMPING_S, Contact
+from drivers.simulated.tyre import DAMPING_S, Contact, require_soft
 from drivers.simulated.world import STEP_S
 from profiles.schema import Profile, SimulationConfig
 from profiles.steered import SemitrailerGeometry
@@ -255,11 +255,4 @@ def _check_stiffness(vehicle: SemitrailerGeometry, simulation: SimulationConfig,
     tyre = simulation.tyre
     stiffness = max(tyre.cornering_stiffness_per_rad, tyre.slip_stiffness)
     least = stiffness * load * mobility * step_s * (step_s + 2.0 * DAMPING_S) / 3.0
-    if tyre.relaxation_length_m < least:
-        raise ConfigError(
-            f"the simulated tyres are too stiff for steps of {1000.0 * step_s:g} ms",
-            object="simulation.tyre.relaxation_length_m",
-            value=tyre.relaxation_length_m,
-            limit=least,
-            remedy=f"set a relaxation length of at least {least:.4f} m, or a smaller cornering stiffness",
-        )
+    require_soft(tyre, least, step_s)

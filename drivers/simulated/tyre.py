@@ -25,12 +25,34 @@ from __future__ import annotations
 
 from math import atan, sqrt
 
+from canhelm.errors import ConfigError
 from profiles.schema import Tyre
 
 DAMPING_S = 0.006
 """Ratio of the rubber's damping to its stiffness (assumed: about a third of critical for a wheel on its bristles)."""
 SLOWEST_REFERENCE_M_S = 0.05
 """Speed below which slip is reported relative to this speed, since the ratio means nothing near standstill."""
+
+
+def require_soft(tyre: Tyre, least_m: float, step_s: float) -> None:
+    """Refuse tyres that an integration step cannot follow.
+
+    Args:
+        tyre: of the profile.
+        least_m: relaxation length that they need.
+        step_s: the step.
+
+    Raises:
+        ConfigError: theirs is shorter.
+    """
+    if tyre.relaxation_length_m < least_m:
+        raise ConfigError(
+            f"the simulated tyres are too stiff for steps of {1000.0 * step_s:g} ms",
+            object="simulation.tyre.relaxation_length_m",
+            value=tyre.relaxation_length_m,
+            limit=least_m,
+            remedy=f"set a relaxation length of at least {least_m:.4f} m, or a smaller slip or cornering stiffness",
+        )
 
 
 class Contact:
