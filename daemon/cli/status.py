@@ -79,7 +79,7 @@ def table(data: Mapping[str, Any]) -> RenderableType:
     parts += [_found(row) for row in data.get("found") or ()]
     parts.append(_brakes(data.get("brakes") or ()))
     parts += [_section(f"brick {brick['name']}", brick) for brick in data.get("bricks") or ()]
-    sections = {title: data.get(title) for title in ("vehicle", "motions", "cycle")}
+    sections = {title: data.get(title) for title in ("vehicle", "localisation", "motions", "cycle")}
     sections |= {**_bus_groups(data.get("bus") or {}), "recording": data.get("recording")}
     parts += [_section(title, value) for title, value in sections.items() if value]
     parts += [_event(event) for event in list(data.get("events") or ())[-SHOWN_EVENTS:]]
