@@ -16,11 +16,11 @@ from typing import Final
 
 from daemon.loops.accelerometer import Vector
 from daemon.loops.omni_guide import Felt, GoalGuide, Guidance
-from daemon.loops.planner import PlanarLimits, PlanarState, Result, plan_motion
+from daemon.loops.planner import PlanarLimits, PlanarState, Result
 from daemon.loops.traction import Traction
 
-PARTS: Final = tuple(2.0 ** (-step / 2) for step in range(13))
-"""Parts of the acceleration that are tried."""
+LEAST_PART: Final = 0.05
+"""Of the acceleration, however short the way is."""
 
 
 class JerkLimitedGuide:
@@ -61,21 +61,27 @@ class JerkLimitedGuide:
         return replace(told, next=following, acceleration_m_s2=acceleration, result=result, eta_s=max(0.0, left))
 
     def _begin(self, start: PlanarState) -> GoalGuide:
-        """Choose the acceleration that arrives first, and fill the window with how the body came here."""
-        tried = [self._planned(start, part * self._limits.acceleration) for part in PARTS]
-        _, limits, cycles = min(tried, key=lambda plan: plan[0])
+        """Choose the acceleration, and fill the window with how the body came here."""
+        way = math.hypot(self._goal.x - start.x, self._goal.y - start.y)
+        acceleration = quickest_acceleration(way, self._limits, self._jerk)
+        cycles = max(1, math.ceil(2 * acceleration / (self._jerk * self._dt)))
         ahead = (cycles - 1) * self._dt / 2
         self._window.extend(_later(start, ahead - age * self._dt) for age in reversed(range(cycles)))
+        limits = replace(self._limits, acceleration=acceleration)
         self._guide = GoalGuide(_later(self._goal, -ahead), limits, self._traction)
         return self._guide
 
-    def _planned(self, start: PlanarState, acceleration: float) -> tuple[float, PlanarLimits, int]:
-        """Time of arrival with an acceleration, the limits, and the window in cycles."""
-        limits = replace(self._limits, acceleration=acceleration)
-        cycles = max(1, math.ceil(2 * acceleration / (self._jerk * self._dt)))
-        lag = (cycles - 1) * self._dt
-        plan = plan_motion(_later(start, lag / 2), _later(self._goal, -lag / 2), limits)
-        return plan.ends + lag, limits, cycles
+
+def quickest_acceleration(way: float, limits: PlanarLimits, jerk: float) -> float:
+    """The acceleration with which a way from rest to rest [m] takes the least time, its window included.
+
+    That is 2 sqrt(way / a) + 2 a / jerk, or way / v + v / a + 2 a / jerk where the speed limit v is reached.
+    """
+    speed, most = limits.speed, limits.acceleration
+    quickest = math.cbrt(jerk * jerk * way / 4)
+    if quickest * way > speed * speed:
+        quickest = max(math.sqrt(speed * jerk / 2), speed * speed / way)
+    return min(most, max(quickest, LEAST_PART * most))
 
 
 def _later(state: PlanarState, time: float) -> PlanarState:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from daemon.loops.jerk_limit import JerkLimitedGuide
+from daemon.loops.jerk_limit import JerkLimitedGuide, quickest_acceleration
 from daemon.loops.omni_guide import Felt, Guidance
 from daemon.loops.planner import PlanarLimits, PlanarState, Result
 from daemon.loops.traction import Traction
@@ -89,6 +89,18 @@ def test_a_short_way_takes_less_than_with_all_of_the_acceleration() -> None:
     told = lead(JerkLimitedGuide(PlanarState(0.1), LIMITS, 2.0, DT), PlanarState())
     least = 4 * (0.1 / (2 * 2.0)) ** (1 / 3)
     assert least < len(told) * DT < 1.25 * least
+
+
+@given(st.floats(0.01, 20), st.floats(0.2, 50))
+def test_no_other_acceleration_takes_a_way_from_rest_to_rest_in_less_time(way: float, jerk: float) -> None:
+    def time(acceleration: float) -> float:
+        speed, window = LIMITS.speed, 2 * acceleration / jerk
+        if acceleration * way <= speed * speed:
+            return 2 * math.sqrt(way / acceleration) + window
+        return way / speed + speed / acceleration + window
+
+    best = time(quickest_acceleration(way, LIMITS, jerk))
+    assert all(best <= time(part / 100 * LIMITS.acceleration) * (1 + 1e-9) for part in range(5, 101))
 
 
 def test_the_time_left_runs_out_at_the_goal() -> None:
