@@ -15,8 +15,8 @@ from daemon.runtime.motions import Motion
 from daemon.runtime.supervisor import Supervisor
 from profiles.path_file import MAX_PIECES, PathSpec, PieceSpec
 
-MAX_KEPT = 4
-"""Paths that are kept for clients which send them in parts; a fifth one takes the oldest one's place."""
+MAX_KEPT = 2
+"""Paths that are kept for clients which send them in parts; one more takes the oldest one's place."""
 T = TypeVar("T")
 
 

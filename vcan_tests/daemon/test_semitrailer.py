@@ -192,3 +192,11 @@ async def test_a_robot_that_steers_otherwise_has_no_paths_of_this_kind() -> None
     async with running_robot(load("turtle").profile) as robot:
         with pytest.raises(Refused, match=r"has no drive\.path"):
             await robot.call("drive.path", path=shipped("line"))
+
+
+async def test_of_paths_in_parts_the_oldest_one_makes_room() -> None:
+    async with running_robot(PROFILE) as robot:
+        names = [(await robot.call("path.add", pieces=[{"line_m": 1}]))["kept"] for _ in range(3)]
+        with pytest.raises(UsageError, match="no pieces are kept"):
+            await robot.call("path.add", pieces=[{"line_m": 1}], kept=names[0])
+        assert (await robot.call("path.add", pieces=[{"line_m": 1}], kept=names[2]))["pieces"] == 2
