@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 from canhelm.errors import CanhelmError
-from daemon.commissioning.dialogue import Daemon, Person, number, told
+from daemon.commissioning.dialogue import Daemon, Person, agrees, number, told
 from profiles.schema import DriveConfig
 
 JOG_M_S = 0.1
@@ -157,15 +157,27 @@ def judge_wheel(seen: Seen, wheels: Mapping[str, DriveConfig], findings: Finding
 async def look_at_wheels(
     daemon: Daemon, person: Person, chosen: list[str], wheels: Mapping[str, DriveConfig], findings: Findings
 ) -> None:
-    """One drive after the other; a drive that fails is told, and the next one follows. Raises EOFError."""
+    """One drive after the other; one that fails is tried again if the person wants to. Raises EOFError."""
     turned: dict[str, str] = {}
     for drive in chosen:
-        try:
-            seen = await look_at_wheel(daemon, person, drive, wheels)
-        except CanhelmError as error:
-            findings.unsolved.append(f"{drive}: {told(error)}")
-            await daemon.call("reset")
+        seen = await _try(daemon, person, drive, wheels, findings)
+        if seen is None:
             continue
         if seen.wheel and turned.setdefault(seen.wheel, drive) != drive:
             findings.unsolved.append(f"wheel {seen.wheel} was seen twice, with {turned[seen.wheel]} and {drive}: again")
         judge_wheel(seen, wheels, findings)
+
+
+async def _try(
+    daemon: Daemon, person: Person, drive: str, wheels: Mapping[str, DriveConfig], findings: Findings
+) -> Seen | None:
+    """What was seen of a drive; None where it fails and the person gives it up."""
+    while True:
+        try:
+            return await look_at_wheel(daemon, person, drive, wheels)
+        except CanhelmError as error:
+            person.tell(f"{drive}: {told(error)}")
+            await daemon.call("reset")
+            if not await agrees(person, f"try {drive} again?"):
+                findings.unsolved.append(f"{drive}: {told(error)}")
+                return None

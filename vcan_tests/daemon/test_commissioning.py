@@ -176,6 +176,25 @@ async def test_breaking_off_puts_everything_back(tmp_path: Path) -> None:
         assert all(brake.engaged for brake in shop.robot.network.brakes.values())
 
 
+@pytest.mark.parametrize(("again", "unsolved"), [("y", 0), ("n", 1)])
+async def test_a_drive_that_faults_is_tried_again_or_left(again: str, unsolved: int, tmp_path: Path) -> None:
+    async with workshop(robot_file(tmp_path)) as shop:
+        faults = [0x2310]
+
+        class Patient(WorkshopPerson):
+            async def ask(self, question: str) -> str:
+                if "press Enter and watch" in question and faults:
+                    soon = asyncio.get_running_loop().time() + 1.0
+                    asyncio.get_running_loop().call_at(soon, drive.trigger_fault, faults.pop())
+                return again if question.startswith("try") else await super().ask(question)
+
+        drive = shop.robot.network.drives["rear_left"]
+        shop.person = Patient(shop.call)
+        findings = await shop.commission("rear_left")
+        assert any("over-current (0x2310)" in heard for heard in shop.person.heard)
+        assert len(findings.unsolved) == unsolved
+
+
 async def test_who_says_no_gets_nothing_changed(tmp_path: Path) -> None:
     async with workshop(robot_file(tmp_path)) as shop:
 
