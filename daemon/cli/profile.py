@@ -167,7 +167,12 @@ def _summary(path: Path) -> dict[str, Any]:
 
 def _counts(loaded: LoadedProfile) -> dict[str, Any]:
     profile = loaded.profile
-    parts = {"drives": len(profile.drives), "encoders": len(profile.encoders), "brakes": len(profile.brakes)}
+    parts = {
+        "drives": len(profile.drives),
+        "bricks": len(profile.bricks),
+        "encoders": len(profile.encoders),
+        "brakes": len(profile.brakes),
+    }
     values = {"values": len(loaded.origin), "assumed_values": len(loaded.assumed), "warnings": len(loaded.warnings)}
     return {"name": profile.name, **parts, **values}
 
