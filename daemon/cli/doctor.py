@@ -15,7 +15,7 @@ from canhelm import protocol
 from canhelm.client import Client
 from canhelm.errors import CanhelmError
 from daemon.cli.options import DEFAULT, Options
-from daemon.cli.output import show
+from daemon.cli.output import say, show
 from drivers.bus.can_link import CanLink, read_link
 
 if TYPE_CHECKING:
@@ -61,17 +61,51 @@ class Finding:
     mend: str = ""
 
 
-def doctor(*, options: Options = DEFAULT) -> int:
+def doctor(
+    *,
+    bundle: Path | None = None,
+    bench: float | None = None,
+    bus: str = "simulated",
+    profile: str = "max2d",
+    options: Options = DEFAULT,
+) -> int:
     """What is wrong with this machine, the daemon, its bus and its drives, each with the line that mends it.
 
     Works without a daemon. The exit code is 1 if there is a problem.
 
-    Example: `canhelm doctor`
+    Example: `canhelm doctor --bundle problem.zip`
+
+    Parameters
+    ----------
+    bundle: Path
+        Write all that a report of a problem needs into this new ZIP file: versions, findings, status, profile, journal
+        and the last run.
+    bench: float
+        Measure for so many seconds which rate of control cycles this machine keeps, instead of looking for problems.
+    bus: str
+        Where to measure: a robot's bus, without a daemon; the default simulates one in this process.
+    profile: str
+        The robot to measure with.
     """
+    if bench is not None:
+        return _bench(bench, bus, profile, options)
     findings = [*machine_findings(), *interface_findings(NETWORK_DEVICES), *_daemon_findings(options)]
     rows = [asdict(finding) for finding in findings]
     show(rows, _table, options.json)
+    if bundle is not None:
+        from daemon.cli.bundle import pack
+
+        say(f"{bundle} holds {', '.join(pack(bundle, rows, options))}; look through it before you send it")
     return int(any(finding.verdict == "problem" for finding in findings))
+
+
+def _bench(duration_s: float, bus: str, profile: str, options: Options) -> int:
+    """Measure; the exit code is 1 where not even the lowest rate is safe."""
+    from daemon.cli import bench
+
+    result = bench.measure(duration_s, bus, profile)
+    show(result, bench.table, options.json)
+    return int(result["highest_safe_hz"] is None)
 
 
 def _table(rows: list[Mapping[str, str]]) -> Table:
@@ -218,6 +252,7 @@ def status_findings(status: Mapping[str, Any], earlier: Mapping[str, Any]) -> It
     yield _bus_finding(bus, old_bus, starting=state in STARTING)
     yield from _line_findings(bus, cycle, starting=state in STARTING)
     yield from _recording_findings(status.get("recording") or {})
+    yield from _runs_findings(status.get("runs") or {})
     if api.get("internal_errors"):
         found = f"{api['internal_errors']} requests failed inside the daemon"
         yield _counted("api", found, "report it with the daemon's log", goes_on=_goes_on(api, old_api))
@@ -265,6 +300,11 @@ def _recording_findings(recording: Mapping[str, Any]) -> Iterator[Finding]:
         yield Finding("recording", "note", f"{lost} frames are missing in the log {path}", "its disk was full")
     elif recording:
         yield Finding("recording", "ok", f"{recording.get('frames')} frames in {path}")
+
+
+def _runs_findings(runs: Mapping[str, Any]) -> Iterator[Finding]:
+    if runs.get("message"):
+        yield Finding("runs", "problem", str(runs["message"]), "make room there, or: canhelm runs delete NUMBER")
 
 
 def _cycle_finding(cycle: Mapping[str, Any], earlier: Mapping[str, Any], pid: int | None) -> Finding:

@@ -16,6 +16,11 @@ def version(*, json: Json = None) -> None:
 
     Example: `canhelm version --json`
     """
+    show(versions(), json=json)
+
+
+def versions() -> dict[str, str | int]:
+    """Versions by name."""
     libraries = {name: metadata.version(name) for name in _STANDS_ON}
-    system = {"python": platform.python_version(), "kernel": platform.release()}
-    show({"canhelm": __version__, "api_version": protocol.API_VERSION, **system, **libraries}, json=json)
+    system = {"python": platform.python_version(), "kernel": platform.release(), "machine": platform.machine()}
+    return {"canhelm": __version__, "api_version": protocol.API_VERSION, **system, **libraries}
