@@ -36,6 +36,7 @@ COMMANDS: dict[Group, dict[str, str]] = {
         "drive": "daemon.cli.drive:app",
         "motor": "daemon.cli.motor:app",
         "brake": "daemon.cli.brake:app",
+        "encoder": "daemon.cli.encoder:app",
         "nxt": "daemon.cli.nxt:app",
         "estop": "daemon.cli.stop:estop",
         "reset": "daemon.cli.stop:reset",
