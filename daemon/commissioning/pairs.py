@@ -1,4 +1,4 @@
-"""Wheel pairs pushed by hand: does each brake lock and release its own pair, and which encoder tells of it, which way?
+"""Wheel pairs and axles pushed by hand: does each brake lock its own pair, and which encoder tells of it, which way?
 
 Everything is pushed with all brakes locked, and again with each of them released. What gives way when tells how each
 brake is wired: to which output, and with which polarity.
@@ -58,6 +58,19 @@ async def _push(daemon: Daemon, person: Person, pair: str, released: str) -> Pus
     if moved:
         await person.ask(f"turn the {pair} pair back straight ahead, then press Enter")
     return Push(pair, released, moved, {name: angle - before[name] for name, angle in after.items()})
+
+
+async def turn_axes(daemon: Daemon, person: Person, encoders: Mapping[str, EncoderConfig]) -> list[Push]:
+    """Axes without brakes of their own, each turned by hand, as of a steered axle. Raises CanhelmError, EOFError."""
+    pushes = []
+    for name in encoders:
+        before = await _headings_deg(daemon)
+        await person.ask(f"turn the axis of encoder {name} to the left by hand, about 20 degrees; then press Enter")
+        after = await _headings_deg(daemon)
+        await person.ask(f"turn the axis of encoder {name} back straight ahead, then press Enter")
+        turned = {encoder: angle - before[encoder] for encoder, angle in after.items()}
+        pushes.append(Push(name, LOCKED, moved=True, turned_deg=turned))
+    return pushes
 
 
 async def _headings_deg(daemon: Daemon) -> dict[str, float]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from canhelm.errors import CanhelmError, NodeAbsent, Refused
 from daemon.commissioning.dialogue import Daemon, Person, agrees, preview, told
-from daemon.commissioning.pairs import follow_swapped_wheels, judge_brakes, judge_encoders, push_pairs
+from daemon.commissioning.pairs import follow_swapped_wheels, judge_brakes, judge_encoders, push_pairs, turn_axes
 from daemon.commissioning.wheels import Findings, Values, look_at_wheels
 from profiles.schema import DriveConfig, PairedSteerGeometry, Profile
 
@@ -60,10 +60,8 @@ async def commission(daemon: Daemon, person: Person, profile: Profile, what: str
         await daemon.call("brake.engage", pair=ALL)
         async with capped(daemon, person, chosen, current_ma):
             await look_at_wheels(daemon, person, chosen, wheels_of(profile), findings)
-        if what in (ALL, PAIRS) and isinstance(profile.vehicle, PairedSteerGeometry):
-            pushes = await push_pairs(daemon, person, profile.vehicle)
-            judge_encoders(pushes, profile.encoders, findings)
-            judge_brakes(pushes, profile, findings)
+        if what in (ALL, PAIRS):
+            await _look_at_pairs(daemon, person, profile, findings)
     finally:
         await daemon.call("stop")
         await daemon.call("brake.engage", pair=ALL)
@@ -73,6 +71,15 @@ async def commission(daemon: Daemon, person: Person, profile: Profile, what: str
     if what == ALL and not findings.unsolved:
         findings.values["setup",] = "done"
     return findings
+
+
+async def _look_at_pairs(daemon: Daemon, person: Person, profile: Profile, findings: Findings) -> None:
+    if isinstance(profile.vehicle, PairedSteerGeometry):
+        pushes = await push_pairs(daemon, person, profile.vehicle)
+        judge_brakes(pushes, profile, findings)
+    else:
+        pushes = await turn_axes(daemon, person, profile.encoders)
+    judge_encoders(pushes, profile.encoders, findings)
 
 
 @asynccontextmanager

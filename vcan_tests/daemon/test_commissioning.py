@@ -133,6 +133,17 @@ async def test_a_robot_that_is_built_as_its_profile_says_changes_nothing(tmp_pat
         assert changes_of(shop.profile, findings.values) == {"setup": ("needed", "done")}
 
 
+async def test_an_axle_that_a_motor_steers_is_held_against_its_encoder(tmp_path: Path) -> None:
+    for name, more in (("mine", ""), ("built", "encoders: {steering_angle: {direction: -1}}\n")):
+        (tmp_path / name).mkdir()
+        text = "schema_version: 1\nname: lab1\nextends: robots/ackermann\n"
+        (tmp_path / name / "lab1.yaml").write_text(text + more)
+    async with workshop(tmp_path / "mine" / "lab1.yaml", tmp_path / "built" / "lab1.yaml") as shop:
+        findings = await shop.commission()
+    assert findings.wrong == ["reversed: the encoder of the steering_angle pair counts the other way"]
+    assert findings.values == {("encoders", "steering_angle", "direction"): -1, ("setup",): "done"}
+
+
 async def test_a_robot_is_not_driven_before_its_setup(tmp_path: Path) -> None:
     async with workshop(robot_file(tmp_path)) as shop:
         with pytest.raises(Interlock, match="was not set up"):

@@ -19,12 +19,16 @@ class WorkshopPerson:
         call: a method of the daemon's API.
         labels: pulses on the labels of encoders that are not as the profile says, by wheel.
         diameters: of wheels [mm] that are not as the profile says.
+
+    Attributes:
+        sensors: names in the daemon's profile of encoders that sit on the axis of another name.
     """
 
     def __init__(
         self, call: Call, labels: dict[str, int] | None = None, diameters: dict[str, float] | None = None
     ) -> None:
         self.heard: list[str] = []
+        self.sensors: dict[str, str] = {}
         self._call = call
         self.labels = labels or {}
         self.diameters = diameters or {}
@@ -48,6 +52,10 @@ class WorkshopPerson:
             return "y" if given["turned_deg"] else "n"
         if back := re.match(r"turn the (\w+) pair back", question):
             await self._call("simulation.hand", name=back[1], angle_deg=-20.0)
+            await asyncio.sleep(MOMENT_S)
+        elif axis := re.match(r"turn the axis of encoder (\w+) (back|to)", question):
+            angle_deg = 20.0 if axis[2] == "to" else 0.0
+            await self._call("simulation.turn", node=self.sensors.get(axis[1], axis[1]), angle_deg=angle_deg)
             await asyncio.sleep(MOMENT_S)
         elif question.startswith("pulses"):
             return str(self.labels.get(self._wheel, ""))
