@@ -80,8 +80,8 @@ def plan(profile: Profile, baud: int) -> SerialPlan:
     """The control cycle of a profile over a line.
 
     Each cycle reads the gateway drive by two objects and every other drive by one remote frame of eight bytes, reads
-    every encoder and every input with an emergency stop, writes four objects of the gateway drive and one frame to each other drive. Each node but the gateway
-    is guarded once in :attr:`SerialPlan.guard_time_s`.
+    every encoder and every input with an emergency stop, writes four objects of the gateway drive and one frame to each
+    other drive. Each node but the gateway is guarded once in :attr:`SerialPlan.guard_time_s`.
     """
     others, encoders = len(profile.drives) - 1, len(profile.encoders)
     gateway_s = 2 * exchange_s(READ_BYTES, baud, forwarded=False) + 4 * exchange_s(WRITE_BYTES, baud, forwarded=False)

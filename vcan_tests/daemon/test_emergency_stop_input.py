@@ -53,7 +53,7 @@ async def test_no_reset_helps_while_it_is_pressed_and_one_does_when_it_is_releas
     async with robot_with_button() as robot:
         await robot.call("simulation.input", node=3, input=1, level="low")
         await robot.until(lambda: robot.state == "estop")
-        with pytest.raises(EmergencyStop, match="front_left.*pressed"):
+        with pytest.raises(EmergencyStop, match=r"front_left.*pressed"):
             await robot.call("reset")
         await robot.call("simulation.input", node=3, input=1, level="high")
         await robot.until(lambda: not robot.app.devices.drives["front_left"].emergency_stop)
