@@ -86,6 +86,7 @@ class FirstContact:
         await self._tasks.close()
 
     def _on_failure(self, name: str, error: BaseException) -> None:
+        self._life.app.master.counters.internal_errors += 1
         self._life.app.supervisor.remark = f"the daemon's {name} failed: {error} - report it with the log"
 
     async def _run(self) -> None:

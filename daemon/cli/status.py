@@ -76,6 +76,8 @@ def table(data: Mapping[str, Any]) -> RenderableType:
 
     nodes = data.get("nodes") or ()
     parts: list[RenderableType] = [_headline(data), _NodeTable(nodes), *_troubles(nodes)]
+    if data.get("setup") == "needed":
+        parts.append("the robot was not set up: `canhelm setup`")
     parts += [_found(row) for row in data.get("found") or ()]
     parts.append(_brakes(data.get("brakes") or ()))
     parts += [_section(f"brick {brick['name']}", brick) for brick in data.get("bricks") or ()]

@@ -122,27 +122,43 @@ def _fits(turn_qc: int, config: DriveConfig, pulses: int) -> bool:
 
 def judge_wheel(seen: Seen, wheels: Mapping[str, DriveConfig], findings: Findings) -> None:
     """Put what was seen of one drive into the findings."""
-    drive, wheel, commanded = seen.drive, seen.wheel, wheels[seen.drive]
-    if not wheel:
-        why = "its encoder counts: is the shaft loose, or the wheel?" if seen.moved else "check motor cable and brake"
-        findings.unsolved.append(f"{drive} does not turn a wheel: {why}")
+    commanded = wheels[seen.drive]
+    trouble = _trouble(seen, commanded)
+    if trouble:
+        findings.unsolved.append(f"{seen.drive} {trouble}")
         return
-    if not seen.moved or not seen.turn_qc:
-        findings.unsolved.append(f"{drive} turns, and its encoder counts nothing: check the encoder's cable")
-        return
-    direction = 1 if seen.turn_qc > 0 else -1
-    if direction != (commanded.direction if seen.forward else -commanded.direction):
-        findings.unsolved.append(f"{drive}: what was seen and what was counted by hand contradict each other: again")
-        return
-    config = wheels[wheel]
-    if wheel != drive:
-        findings.wrong.append(f"swapped: drive {drive} (node {commanded.node}) turns wheel {wheel}")
+    wheel, config, direction = seen.wheel, wheels[seen.wheel], _direction(seen)
+    if wheel != seen.drive:
+        findings.wrong.append(f"swapped: drive {seen.drive} (node {commanded.node}) turns wheel {wheel}")
     if direction != commanded.direction:
         findings.wrong.append(f"reversed: {wheel} rolls backward when it shall roll forward")
-    found = {"node": commanded.node, "direction": direction, "encoder_pulses_per_turn": seen.pulses}
-    if seen.pulses != config.encoder_pulses_per_turn:
-        pulses = config.encoder_pulses_per_turn
+    findings.put("drives", wheel, {"node": commanded.node, "direction": direction}, config)
+    _judge_size(seen, config, findings)
+
+
+def _direction(seen: Seen) -> int:
+    return 1 if seen.turn_qc > 0 else -1
+
+
+def _trouble(seen: Seen, commanded: DriveConfig) -> str:
+    """What no profile can put right; empty for nothing."""
+    if not seen.wheel and not seen.moved:
+        return "does not turn a wheel: check motor cable and brake"
+    if not seen.wheel:
+        return "does not turn a wheel, and its encoder counts: is the shaft loose, or the wheel?"
+    if not seen.moved or not seen.turn_qc:
+        return "turns, and its encoder counts nothing: check the encoder's cable"
+    if _direction(seen) != (commanded.direction if seen.forward else -commanded.direction):
+        return "was seen to turn one way and was counted the other way by hand: look again"
+    return ""
+
+
+def _judge_size(seen: Seen, config: DriveConfig, findings: Findings) -> None:
+    """Pulses, gear and radius."""
+    wheel, pulses = seen.wheel, config.encoder_pulses_per_turn
+    if seen.pulses != pulses:
         findings.wrong.append(f"counts: {wheel} has an encoder of {seen.pulses} pulses, not {pulses}")
+        findings.values["drives", wheel, "encoder_pulses_per_turn"] = seen.pulses
     if not _fits(seen.turn_qc, config, seen.pulses):
         ratio = abs(seen.turn_qc) / (4 * seen.pulses)
         findings.wrong.append(f"gear: {wheel} has {ratio:.4g} motor turns a wheel turn, not {config.total_ratio:.4g}")
@@ -151,7 +167,6 @@ def judge_wheel(seen: Seen, wheels: Mapping[str, DriveConfig], findings: Finding
         sizes = f"{seen.radius_m * 1e3:.4g} mm, not {config.wheel_radius_m * 1e3:.4g} mm"
         findings.wrong.append(f"radius: {wheel} has {sizes}")
         findings.values["drives", wheel, "wheel_radius_m"] = round(seen.radius_m, 6)
-    findings.put("drives", wheel, found, config)
 
 
 async def look_at_wheels(

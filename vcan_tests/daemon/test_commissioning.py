@@ -243,7 +243,7 @@ def test_a_persons_words_are_understood_or_asked_for_again(answer: str, seen: tu
         (Seen("rear_left", "", forward=False, moved=False), "check motor cable and brake"),
         (Seen("rear_left", "", forward=False, moved=True), "is the shaft loose"),
         (Seen("rear_left", "rear_left", forward=True, moved=False), "its encoder counts nothing"),
-        (Seen("rear_left", "rear_left", forward=True, moved=True, turn_qc=-56000), "contradict each other"),
+        (Seen("rear_left", "rear_left", forward=True, moved=True, turn_qc=-56000), "look again"),
     ],
 )
 def test_what_a_profile_cannot_put_right_is_left_to_the_person(seen: Seen, words: str) -> None:

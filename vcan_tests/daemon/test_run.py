@@ -112,6 +112,22 @@ def test_an_empty_record_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> N
     assert "--record is empty" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ("run --simulate", "which robot?"),
+        ("run --bus socketcan:can0 --bit-rate 7", "7 bit/s is no bit rate of an EPOS"),
+        ("run --simulate --profile max2d --bit-rate 500000", "--bit-rate is for a bus without a profile"),
+        ("run --bus socketcan:can0 --profile max2d --miswire max2d", "socketcan:can0 is real"),
+    ],
+)
+def test_options_that_make_no_sense_together_are_refused(
+    arguments: str, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments.split()) == 2
+    assert words in capsys.readouterr().err
+
+
 def test_real_drives_cannot_be_asked_to_have_no_power(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "--bus", "socketcan:can0", "--profile", "max2d", "--unpowered"]) == 2
     assert "socketcan:can0 is real" in capsys.readouterr().err
