@@ -48,6 +48,13 @@ _TALK = (
         Role.WATCH,
     ),
     Method("unsubscribe", "Send no more.", (), "lost_samples", Role.WATCH),
+    Method(
+        "bus.frames",
+        "Frames of the bus as lines of a candump log; the answer waits a moment for them.",
+        (Param("after", "integer", "the last answer's next; from now on where left out", default=None, minimum=0),),
+        "frames, next, lost",
+        Role.WATCH,
+    ),
     Method("lease.renew", "The client is alive: its motions go on.", (), "lease", Role.WATCH),
     Method(
         "lease.close", "Stop the motions of this connection; answers when they have ended.", (), "state", Role.WATCH

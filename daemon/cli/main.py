@@ -47,6 +47,7 @@ COMMANDS: dict[Group, dict[str, str]] = {
         "explain": "daemon.cli.explain:explain",
         "runs": "daemon.cli.runs:runs",
         "plot": "daemon.cli.plot:plot",
+        "record": "daemon.cli.record:record",
         "replay": "daemon.cli.replay:replay",
     },
     NETWORK: {

@@ -9,6 +9,7 @@ from daemon.runtime.brake_commands import BrakeCommands
 from daemon.runtime.brick_commands import BrickCommands
 from daemon.runtime.config_commands import ConfigCommands
 from daemon.runtime.encoder_commands import EncoderCommands
+from daemon.runtime.frame_commands import FrameCommands
 from daemon.runtime.handlers import Handler, Params, holder, run_motion
 from daemon.runtime.motions import Motion
 from daemon.runtime.motor_commands import MotorCommands
@@ -45,6 +46,7 @@ class Commands:
             **BrickCommands(supervisor).handlers,
             **EncoderCommands(supervisor).handlers,
             **NetworkCommands(supervisor).handlers,
+            **FrameCommands(supervisor.master.bus).handlers,
             **NodeCommands(supervisor).handlers,
             **ConfigCommands(supervisor).handlers,
             **SimulationCommands(supervisor, network).handlers,
