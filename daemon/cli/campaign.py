@@ -114,7 +114,7 @@ def drive_missing(cases: Sequence[Case], out: Path, workers: int | None, dask: s
             raise
         if missing:
             took, where = time.perf_counter() - begin, dask or f"{count} workers"
-            say(f"{len(missing)} runs in {took:.1f} s with {where}: {len(missing) / took:.0f} runs/s")
+            say(f"{len(missing)} runs in {took:.1f} s with {where}: {len(missing) / took:.3g} runs/s")
         write_parquet(results, out)
         return results.in_order()
 
