@@ -197,6 +197,17 @@ def test_the_commands_print_tables_and_draw_pictures(
     assert {path.name for path in tmp_path.glob("*.png")} == {"bounds.png", "bounds-runs.png"}
 
 
+def test_tuning_compares_the_best_pair_with_the_thesis_pair(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(cases, "BENDING_GAINS", (4.0,))
+    monkeypatch.setattr(cases, "LOOK_AHEADS_M", (0.425,))
+    assert main(["campaign", "tuning", "--workers", "1", "--out", str(tmp_path), "--json"]) == 0
+    found = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [row["failed"] for row in found if "failed" in row] == [0, 10], "with an ideal steering, and with 60°/s"
+    assert len(list(tmp_path.glob("tuning-*.png"))) == 3
+
+
 @pytest.mark.parametrize("option", [["--workers", "0"], ["--random", "0"], ["--through", "water"]])
 def test_senseless_options_are_refused(option: list[str], tmp_path: Path) -> None:
     assert main(["campaign", "bounds", "--out", str(tmp_path), *option]) == 2
