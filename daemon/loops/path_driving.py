@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
 
@@ -26,6 +26,9 @@ REST_M_S: Final = 0.005
 REST_S: Final = 0.1
 REACTION_S: Final = 0.03
 """From a measurement to what the drives make of it: two or three control cycles."""
+STEERING_LAG_S: Final = 0.08
+"""By which a steered axle with its drive is later than one that only has a rate; with a trailer the cascade looks so
+much farther ahead."""
 JACKKNIFE_RESERVE_RAD: Final = math.radians(3.0)
 STRAYED_M: Final = 0.6
 STRAYED_RAD: Final = math.radians(75)
@@ -208,7 +211,10 @@ Law = Callable[[Pose, VehicleReading], FollowingStep]
 
 
 def _cascade_law(vehicle: ArticulatedVehicle, path: Path, rate_rad_s: float) -> tuple[SectionFollower, Law]:
-    follower = CascadeFollower(vehicle, path, CascadeTuning(), rate_rad_s)
+    tuning = CascadeTuning()
+    if vehicle.hitches:
+        tuning = replace(tuning, lead_s=tuning.lead_s + STEERING_LAG_S)
+    follower = CascadeFollower(vehicle, path, tuning, rate_rad_s)
 
     def law(unit: Pose, reading: VehicleReading) -> FollowingStep:
         return follower.step(unit, _bending(reading), reading.steering_rad, reading.speed_m_s)
