@@ -21,6 +21,8 @@ FACTS, PROFILE, DRIVES = "run.yaml", "profile.yaml", "drives.yaml"
 CYCLES, TERMS, FRAMES = "cycles.csv", "terms.jsonl", "frames.log"
 LIMIT_BYTES = 200_000_000
 """What all runs of a robot may take, unless told otherwise."""
+PARTS = 8
+"""A run takes this part of all room at most; a motion that takes more goes on in a further run."""
 RESERVE_BYTES = 50_000_000
 """What runs leave free on their disk for everything else."""
 LAST = "last"
@@ -64,11 +66,15 @@ class RunStore:
     Args:
         folder: need not be there yet.
         limit_bytes: what all runs may take.
+
+    Attributes:
+        run_bytes: what one of them may take.
     """
 
     def __init__(self, folder: Path, limit_bytes: int = LIMIT_BYTES) -> None:
         self.folder = folder
         self.limit_bytes = limit_bytes
+        self.run_bytes = limit_bytes // PARTS
 
     def folders(self) -> list[Path]:
         """The folders of runs, oldest first."""
@@ -88,11 +94,11 @@ class RunStore:
         return folder
 
     def make_room(self) -> None:
-        """Delete the oldest runs until the limit and the disk leave room. Raises OSError where the disk is full."""
+        """Delete the oldest runs until there is room for one more. Raises OSError where the disk is full."""
         sizes = {folder: size_of(folder) for folder in self.folders()}
         taken = sum(sizes.values())
         for folder, size in sizes.items():
-            if taken <= self.limit_bytes and self._free_bytes() >= RESERVE_BYTES:
+            if taken + self.run_bytes <= self.limit_bytes and self._free_bytes() >= RESERVE_BYTES:
                 return
             shutil.rmtree(folder)
             taken -= size

@@ -29,8 +29,6 @@ from profiles.schema import Profile
 
 LOGGER = logging.getLogger("canhelm.runs")
 FLUSH_PERIOD_S = 1.0
-PARTS = 8
-"""A motion that takes more than this part of all room goes on in a new run, so that the oldest can be deleted."""
 
 
 class Recording:
@@ -98,11 +96,15 @@ class RunRecorder:
         self._epoch_s = 0.0 if virtual else time.time() - self._loop.time()
         self._disk = Disk(self._on_failure)
         self._rows = CycleRows(self._supervisor)
-        self._supervisor.on_motion.append(self._begin)
+        self._supervisor.on_motion.append(self._on_motion)
+        self._supervisor.observers.append(self._on_cycle)
+        self._bus.taps.append(self._on_frame)
 
     def close(self) -> None:
         """End the runs under way and write what is left."""
-        self._supervisor.on_motion.remove(self._begin)
+        self._supervisor.on_motion.remove(self._on_motion)
+        self._supervisor.observers.remove(self._on_cycle)
+        self._bus.taps.remove(self._on_frame)
         for recording in list(self._recordings):
             self._end(recording)
         self._disk.close()
@@ -112,12 +114,31 @@ class RunRecorder:
         last = self._last.name if self._last else None
         return {"folder": str(self._store.folder), "last": last, "message": self.message}
 
+    # --- guarded: a defect of the recording is no reason to stop a robot ----------------------------------------
+
+    def _on_motion(self, motion: Motion) -> None:
+        try:
+            self._begin(motion)
+        except Exception:
+            self._give_up()
+
+    def _on_cycle(self) -> None:
+        try:
+            self._end_closed()
+            if self._recordings:
+                self._gather()
+        except Exception:
+            self._give_up()
+
+    def _give_up(self) -> None:
+        self._recordings.clear()
+        self.message = "the recording of runs failed inside the daemon: report it with the log"
+        LOGGER.exception(self.message)
+
     # --- a run -------------------------------------------------------------------------------------------------
 
     def _begin(self, motion: Motion, part: int = 1) -> None:
-        if not self._recordings:
-            self._bus.taps.append(self._on_frame)
-            self._supervisor.observers.append(self._on_cycle)
+        self._end_closed()
         self.message = ""
         recording = Recording(motion, part, self._loop.time())
         recording.facts = self._facts(recording)
@@ -160,9 +181,6 @@ class RunRecorder:
 
     def _end(self, recording: Recording, ended: str | None = None, message: str = "") -> None:
         self._recordings.remove(recording)
-        if not self._recordings:
-            self._bus.taps.remove(self._on_frame)
-            self._supervisor.observers.remove(self._on_cycle)
         self._flush(recording)
         facts = {
             **recording.facts,
@@ -180,30 +198,34 @@ class RunRecorder:
 
     # --- gathering ---------------------------------------------------------------------------------------------
 
-    def _on_cycle(self) -> None:
+    def _gather(self) -> None:
         now_s = self._loop.time()
         row = self._rows.row()
         for recording in list(self._recordings):
             if not recording.failed:
                 self._take(recording, row, now_s)
-            if recording.motion.closed.is_set():
-                self._end(recording)
-            elif recording.size_bytes > self._store.limit_bytes / PARTS:
+            if recording.size_bytes > self._store.run_bytes:
                 self._end(recording, "continued", "goes on in the next run")
                 self._begin(recording.motion, recording.part + 1)
+
+    def _end_closed(self) -> None:
+        for recording in list(self._recordings):
+            if recording.motion.closed.is_set():
+                self._end(recording)
 
     def _take(self, recording: Recording, row: str, now_s: float) -> None:
         motion, time_s = recording.motion, now_s - recording.begun_s
         recording.rows += 1
         recording.cycles += f"{time_s:.4f},{row}\n".encode()
-        if motion.running:
-            terms = motion.progress() if motion.record is None else motion.record
-            recording.terms += msgspec.json.encode({"time_s": round(time_s, 4), "terms": terms}) + b"\n"
+        terms = motion.progress() if motion.record is None else motion.record
+        recording.terms += msgspec.json.encode({"time_s": round(time_s, 4), "terms": terms}, enc_hook=str) + b"\n"
         if now_s - recording.flushed_s >= FLUSH_PERIOD_S:
             recording.flushed_s = now_s
             self._flush(recording)
 
     def _on_frame(self, can_id: int, data: bytes, timestamp_s: float) -> None:
+        if not self._recordings:
+            return
         line = f"{make_line(self._epoch_s + timestamp_s, self._bus.name, can_id, data)}\n".encode()
         for recording in self._recordings:
             recording.frames += line

@@ -13,9 +13,10 @@ from typing import Any
 import pytest
 import yaml
 
-from canhelm.errors import CanhelmError
+from canhelm.errors import CanhelmError, UsageError
 from daemon.runs import store as store_module
-from daemon.runs.store import CYCLES, DRIVES, FRAMES, PROFILE, TERMS, Run, RunStore, read_runs
+from daemon.runs.store import CYCLES, DRIVES, FRAMES, PROFILE, TERMS, Run, RunStore, choose, own_folder, read_runs
+from daemon.runtime.cycle_rows import CycleRows
 from drivers.bus.candump import parse_line
 from profiles.loader import load
 from vcan_tests.robot import Robot, running_robot
@@ -49,9 +50,7 @@ async def test_a_row_a_cycle_holds_commanded_and_measured_speeds(tmp_path: Path)
     times = [float(row["time_s"]) for row in rows]
     assert float(fastest["rear_left.commanded_m_s"]) == pytest.approx(0.5, abs=0.01)
     assert float(fastest["rear_left.speed_m_s"]) == pytest.approx(0.5, abs=0.02)
-    assert all(
-        later - earlier == pytest.approx(0.01, abs=1e-3) for earlier, later in pairwise(times)
-    )
+    assert all(later - earlier == pytest.approx(0.01, abs=1e-3) for earlier, later in pairwise(times))
 
 
 async def test_the_last_row_is_where_the_robot_came_to_rest(tmp_path: Path) -> None:
@@ -71,7 +70,7 @@ async def test_the_terms_of_the_law_are_kept_step_by_step(tmp_path: Path) -> Non
     run = await drive(tmp_path)
     steps = [json.loads(line) for line in (run.folder / TERMS).read_text().splitlines()]
     phases = [phase for phase, _ in groupby(step["terms"]["phase"] for step in steps)]
-    assert phases == ["stopping", "driving", "stopping", "resting"]
+    assert phases == ["enabling", "stopping", "driving", "stopping", "resting"]
 
 
 async def test_a_motion_without_a_law_keeps_its_progress(tmp_path: Path) -> None:
@@ -114,13 +113,13 @@ async def test_a_daemon_that_goes_down_ends_its_runs(tmp_path: Path) -> None:
 
 
 async def test_the_oldest_runs_make_room(tmp_path: Path) -> None:
-    async with running_robot(runs=RunStore(tmp_path, limit_bytes=1_000_000)) as robot:
-        for _ in range(8):
+    async with running_robot(runs=RunStore(tmp_path, limit_bytes=2_000_000)) as robot:
+        for _ in range(12):
             await robot.call("drive.parallel", **STRAIGHT)
     runs = read_runs([tmp_path])
-    assert runs[-1].number == 8
+    assert runs[-1].number == 12
     assert runs[0].number > 1
-    assert sum(run.size_bytes for run in runs[:-1]) <= 1_000_000
+    assert sum(run.size_bytes for run in runs) <= 2_000_000
 
 
 async def test_a_long_motion_goes_on_in_further_runs(tmp_path: Path) -> None:
@@ -156,6 +155,20 @@ async def test_a_full_disk_is_told_once_with_what_mends_it(tmp_path: Path, monke
     assert "canhelm runs delete" in told[0]["remedy"]
 
 
+async def test_a_defect_of_the_recording_does_not_stop_the_robot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def defect(rows: CycleRows) -> str:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(CycleRows, "row", defect)
+    async with running_robot(runs=RunStore(tmp_path), expect_errors=True) as robot:
+        result = await robot.call("drive.parallel", **STRAIGHT)
+        told = robot.app.service.status()["runs"]["message"]
+    assert result["steering_error_deg"] == 0.0
+    assert "failed inside the daemon" in told
+
+
 async def test_recording_goes_on_with_the_next_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     async with running_robot(runs=RunStore(tmp_path)) as robot:
         await refuse_to_write(robot, monkeypatch)
@@ -169,6 +182,27 @@ def test_a_disk_without_its_reserve_takes_no_run(tmp_path: Path, monkeypatch: py
     with pytest.raises(OSError, match="No space"):
         RunStore(tmp_path).begin()
     assert RunStore(tmp_path).folders() == []
+
+
+async def test_a_move_that_a_brick_carries_out_itself_leaves_its_progress(tmp_path: Path) -> None:
+    async with running_robot(load("nxt").profile, runs=RunStore(tmp_path)) as robot:
+        await robot.call("nxt.line", distance_m=0.2)
+    steps = [json.loads(line) for line in (tmp_path / "0001" / TERMS).read_text().splitlines()]
+    assert max(step["terms"]["x_m"] for step in steps) == pytest.approx(0.2, abs=0.05)
+
+
+def test_a_service_keeps_its_runs_with_its_state() -> None:
+    assert own_folder("lab1", {"STATE_DIRECTORY": "/var/lib/canhelm/lab1"}) == Path("/var/lib/canhelm/lab1/runs")
+
+
+def test_a_person_keeps_runs_in_the_own_state_folder() -> None:
+    assert own_folder("lab1", {"XDG_STATE_HOME": "/home/a/state"}) == Path("/home/a/state/canhelm/lab1/runs")
+
+
+def test_a_number_that_two_robots_have_is_asked_back(tmp_path: Path) -> None:
+    runs = [Run(1, tmp_path, {"robot": "lab1"}), Run(1, tmp_path, {"robot": "lab2"})]
+    with pytest.raises(UsageError, match="several robots have a run 1: lab1, lab2"):
+        choose(runs, "1")
 
 
 @pytest.mark.real_time
