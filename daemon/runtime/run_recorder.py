@@ -120,6 +120,7 @@ class RunRecorder:
         try:
             self._begin(motion)
         except Exception:
+            LOGGER.exception("the recording of runs failed")
             self._give_up()
 
     def _on_cycle(self) -> None:
@@ -128,12 +129,12 @@ class RunRecorder:
             if self._recordings:
                 self._gather()
         except Exception:
+            LOGGER.exception("the recording of runs failed")
             self._give_up()
 
     def _give_up(self) -> None:
         self._recordings.clear()
         self.message = "the recording of runs failed inside the daemon: report it with the log"
-        LOGGER.exception(self.message)
 
     # --- a run -------------------------------------------------------------------------------------------------
 
