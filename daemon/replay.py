@@ -24,14 +24,14 @@ class Replayed:
         rows: pose by odometry, and each device's reading, by time and name.
         events: what nodes reported: boot-ups, emergencies.
         frames: frames of the log.
-        unknown: of these, how many belong to no device of the profile, and to none of the master's services.
+        read: of these, how many the daemon reads; others are its own, or of nobody in the profile.
         malformed: of these, how many a device could not have sent.
     """
 
     rows: list[dict[str, Any]] = field(default_factory=list)
     events: list[dict[str, Any]] = field(default_factory=list)
     frames: int = 0
-    unknown: int = 0
+    read: int = 0
     malformed: int = 0
 
 
@@ -69,7 +69,8 @@ async def replay(profile: Profile, log: Iterable[LogFrame], every_s: float) -> R
                     {"time_s": round(now_s, 6), **vehicle.status().get("odometry", {}), **_read(devices)}
                 )
         bus.receiver(frame.can_id, frame.data, now_s)
-    replayed.unknown, replayed.malformed = master.counters.unknown, master.counters.malformed
+    replayed.read = replayed.frames - master.counters.unknown
+    replayed.malformed = master.counters.malformed
     return replayed
 
 

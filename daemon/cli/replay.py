@@ -38,7 +38,7 @@ def replay(file: Path, /, *, profile: str = "max2d", every: float = 0.1, json: J
             f"robot {robot.name} has a brick beside CAN", value=profile, remedy="a log of CAN has no brick"
         )
     replayed = run_virtual(decode(robot, _frames(file), every))
-    say(f"{replayed.frames} frames, {replayed.unknown} of nobody in the profile, {replayed.malformed} malformed")
+    say(f"{replayed.frames} frames, of which the daemon reads {replayed.read}; {replayed.malformed} malformed")
     rows = sorted([*replayed.rows, *replayed.events], key=lambda row: float(row["time_s"]))
     show(rows, _table, json)
 

@@ -42,6 +42,7 @@ async def test_the_way_of_the_robot_is_found_again_in_the_frames(log: Path) -> N
 async def test_a_healthy_log_has_nothing_malformed(log: Path) -> None:
     replayed = await replay(load("max2d").profile, frames(log), 0.1)
     assert (replayed.frames, replayed.malformed) == (len(frames(log)), 0)
+    assert 0 < replayed.read < replayed.frames
 
 
 async def test_rows_are_no_closer_than_was_asked(log: Path) -> None:
