@@ -15,8 +15,8 @@ from typing import Annotated, ClassVar, Literal
 from msgspec import Meta, field
 
 from profiles.bricks import BrickConfig, DifferentialGeometry, NxtMotorConfig
-from profiles.parts import Name, NotNegative, Part, Positive
 from profiles.localisation import LocalisationConfig, SimulatedScannerConfig
+from profiles.parts import Name, NotNegative, Part, Positive
 from profiles.sensors import AngleCalibration, SensorDefects
 from profiles.steered import CarGeometry, SemitrailerGeometry
 
