@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from canhelm.errors import EmergencyStop, LimitExceeded, NodeAbsent, Refused
+from daemon.api.methods import METHODS
 from daemon.api.server import Server
 
 FAILURES = {
@@ -97,7 +98,7 @@ class FakeBackend:
         if failure is not None:
             raise failure
         if lease is not None and "wait" in params:
-            way_s = SHORT_WAY_S if method == "drive.to" else ENDLESS_S
+            way_s = ENDLESS_S if METHODS[method].ends_by or method == "steer" else SHORT_WAY_S
             await self._move(lease, params.get("duration_s") or way_s)
         return {"motion": "1"} if "wait" in params else {"state": self.state}
 
