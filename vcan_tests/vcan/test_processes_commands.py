@@ -17,6 +17,7 @@ pytestmark = [pytest.mark.vcan, pytest.mark.timeout(120)]
 TYPED = (
     ("status", 0, "080#"),
     ("doctor", 0, ""),
+    ("record --duration 0.3", 0, "080#"),
     ("motor enable 2", 0, "202#0F00"),
     ("motor velocity 2 150 --duration 0.3", 0, "202#0F0096000000"),
     ("motor position 2 2000 --relative", 0, "602#2F606000"),
