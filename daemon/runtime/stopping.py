@@ -85,6 +85,8 @@ class Stopping:
     @property
     def message(self) -> str:
         """What is latched, and how to get on; empty where nothing is."""
+        if self.estop_reason and self.pressed:
+            return f"emergency stop: {self.pressed}; release it, then `canhelm reset`"
         if self.estop_reason:
             return f"emergency stop: {self.estop_reason}; reset by `canhelm reset`"
         if self.cause is None:
@@ -106,7 +108,7 @@ class Stopping:
         if self.estop_reason:
             raise EmergencyStop(
                 f"the emergency stop is latched: {self.estop_reason}",
-                remedy="make sure that it is safe, then `canhelm reset`",
+                remedy=f"{'release it' if self.pressed else 'make sure that it is safe'}, then `canhelm reset`",
             )
         if self.cause is not None:
             raise NotReady(f"the vehicle is in fault: {self.cause.message}", remedy="`canhelm reset`")

@@ -55,9 +55,11 @@ async def test_no_reset_helps_while_it_is_pressed_and_one_does_when_it_is_releas
         await robot.until(lambda: robot.state == "estop")
         with pytest.raises(EmergencyStop, match=r"front_left.*pressed"):
             await robot.call("reset")
+        assert "release it, then" in robot.app.service.status()["message"]
         await robot.call("simulation.input", node=3, input=1, level="high")
         await robot.until(lambda: not robot.app.devices.drives["front_left"].emergency_stop)
         assert robot.state == "estop"
+        assert "release it" not in robot.app.service.status()["message"]
         await robot.call("reset")
         assert robot.state == "idle"
 
