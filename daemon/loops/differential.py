@@ -135,14 +135,18 @@ def way_to(drive: DifferentialDrive, goal: Pose, power: float) -> list[Move]:
 def parse_move(drive: DifferentialDrive, text: str, power: float) -> Move:
     """A move in words: ``line METRES``, or ``bend METRES DEGREES [right] [back]``. Raises ValueError."""
     kind, *words = text.split() or [""]
-    numbers = [float(word) for word in words if word not in ("right", "back")]
+    no_move = ValueError(f"{text!r} is no move: line METRES, or bend METRES DEGREES [right] [back]")
+    try:
+        numbers = [float(word) for word in words if word not in ("right", "back")]
+    except ValueError:
+        raise no_move from None
     flags = [word for word in words if word in ("right", "back")]
     if kind == "line" and len(numbers) == 1 and not flags:
         return line(drive, numbers[0], power)
     if kind == "bend" and len(numbers) == 2:
         signed = -power if "back" in flags else power
         return bend(drive, numbers[0], math.radians(numbers[1]), signed, clockwise="right" in flags)
-    raise ValueError(f"{text!r} is no move")
+    raise no_move
 
 
 class TachoCompensation:

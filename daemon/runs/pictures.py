@@ -19,7 +19,7 @@ from matplotlib import pyplot as plt
 
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
 """Okabe and Ito's palette, which colour-blind people can tell apart."""
-SLIP = "slip, wheel {}"
+SLIP = "slip along {}"
 
 
 def draw(run: Run, path: Path) -> list[str]:
@@ -105,12 +105,12 @@ def _active(axes: Any, table: Table, times: Mapping[str, list[float]]) -> None:
 
 
 def _slips(run: Run) -> dict[str, list[float]]:
-    """When the law detected slip, by wheel [s]; laws that detect none have no such term."""
+    """When the law detected slip, along each axis of the robot [s]; laws that detect none have no such term."""
     times: dict[str, list[float]] = {}
     for time_s, terms in _terms(run):
-        for wheel, slips in enumerate(terms.get("guidance", terms).get("slip") or ()):
+        for axis, slips in zip("xy", terms.get("guidance", terms).get("slip") or (), strict=False):
             if slips:
-                times.setdefault(SLIP.format(wheel + 1), []).append(time_s)
+                times.setdefault(SLIP.format(axis), []).append(time_s)
     return times
 
 
