@@ -49,8 +49,8 @@ make_known() { # to the running system: users, folders, units, rules
 
 install_files
 [ "${1:-all}" = files ] && exit
-case "$("$PYTHON" -c 'import sys; print(sys.base_prefix)')" in
-/home/* | /root/*)
+case "$("$PYTHON" -c 'import sys; print(sys.base_prefix.split("/")[1])')" in
+home | root) # what ProtectHome= hides
 	echo "$PYTHON lives in a home folder, which the service may not see: make SERVICE_PYTHON=/usr/bin/python3 install" >&2
 	exit 1
 	;;

@@ -6,6 +6,7 @@ import os
 import re
 import stat
 import subprocess
+import sys
 from configparser import RawConfigParser
 from pathlib import Path
 
@@ -98,6 +99,19 @@ def test_uninstalling_leaves_profiles_and_settings_only(tmp_path: Path) -> None:
     (tmp_path / "etc/canhelm/robots/lab1.yaml").write_text("extends: robots/max2d\n")
     _run(UNINSTALL, tmp_path)
     assert _files(tmp_path) == {"etc/canhelm/canhelm.env", "etc/canhelm/robots/lab1.yaml"}
+
+
+@pytest.mark.parametrize("top", ["home", "root"])
+def test_a_python_in_a_folder_that_the_service_cannot_see_is_refused(top: str, tmp_path: Path) -> None:
+    python = tmp_path / "python3"
+    python.write_text(
+        f"#!/bin/sh\nexec {sys.executable} -c \"import sys; sys.base_prefix = '/{top}/ann/python'; $2\"\n"
+    )
+    python.chmod(0o755)
+    environment = {**os.environ, "DESTDIR": str(tmp_path), "PYTHON": str(python)}
+    refused = subprocess.run([str(INSTALL)], env=environment, capture_output=True, text=True)
+    assert refused.returncode == 1
+    assert refused.stderr.startswith(f"{python} lives in a home folder")
 
 
 @pytest.mark.parametrize("key", ["ExecStart", "ExecReload", "ExecStopPost"])
