@@ -19,8 +19,13 @@ def test_bad(): assert False
 @pytest.fixture
 def broken(): raise OSError
 def test_error(broken): pass
-@pytest.mark.skip
-def test_skipped(): pass
+def test_skipped(): pytest.importorskip("a_module_that_is_nowhere")
+"""
+
+GOOD_AND_SKIPPED = """
+import pytest
+def test_good(): pass
+def test_skipped(): pytest.importorskip("a_module_that_is_nowhere")
 """
 
 
@@ -46,7 +51,7 @@ def test_the_counts_are_those_of_pytests_report(tmp_path: Path) -> None:
 
 
 def test_a_run_with_a_skipped_test_is_not_good(tmp_path: Path) -> None:
-    part = reported(tmp_path, "import pytest\ndef test_good(): pass\n@pytest.mark.skip\ndef test_other(): pass\n")
+    part = reported(tmp_path, GOOD_AND_SKIPPED)
     assert (part.status, part.good) == (0, False)
 
 

@@ -72,7 +72,7 @@ class VirtualTimeLoop(asyncio.BaseEventLoop):
         self, executor: Executor | None, func: Callable[[Unpack[Ts]], T], *args: *Ts
     ) -> asyncio.Future[T]:
         """Refused: a thread takes real time, which would make the run depend on the machine."""
-        raise NotImplementedError("virtual time has no threads: run this on a real loop")
+        raise RuntimeError("virtual time has no threads: run this on a real loop")
 
     def close(self) -> None:
         """Drop all timers and close the loop."""
