@@ -12,7 +12,7 @@ PACKAGED = $(shell find canhelm daemon drivers profiles packaging systemd -type 
 PACKAGING = DESTDIR='$(DESTDIR)' PREFIX='$(PREFIX)' PYTHON='$(SERVICE_PYTHON)' PIP_PYTHON='$(VENV)/bin/python'
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test lint vcan-test vcan-figures install uninstall deb
+.PHONY: help venv demo test lint vcan-test vcan-figures install uninstall deb client-wheel
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST)
@@ -40,6 +40,9 @@ uninstall: ## take it away again; profiles, logs and state stay
 	$(PACKAGING) packaging/uninstall.sh
 
 deb: dist/.stamp-deb ## the service as a Debian package, into dist/
+
+client-wheel: | $(VENV)/bin/pip ## the client for programs in environments of their own, into dist/
+	$(VENV)/bin/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist packaging/client
 
 lint: $(VENV)/.stamp-test ## style, types and import rules
 	$(VENV)/bin/ruff check .
