@@ -68,8 +68,12 @@ async def adapter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncItera
         adapter.unplug()
 
 
-def bus_of(adapter: Adapter) -> PythonCanBus:
-    return python_can_bus("slcan", str(adapter.path), 500_000)
+@pytest.fixture
+async def bus(adapter: Adapter) -> AsyncIterator[PythonCanBus]:
+    """A back end over the adapter; what a test leaves open is closed."""
+    bus = python_can_bus("slcan", str(adapter.path), 500_000)
+    yield bus
+    await bus.close()
 
 
 async def until(condition: Callable[[], bool]) -> None:
@@ -87,9 +91,8 @@ def listen(bus: PythonCanBus) -> list[tuple[int, bytes]]:
     return frames
 
 
-async def test_frames_go_through_the_adapter_both_ways(adapter: Adapter) -> None:
+async def test_frames_go_through_the_adapter_both_ways(adapter: Adapter, bus: PythonCanBus) -> None:
     adapter.plug_in()
-    bus = bus_of(adapter)
     await bus.open()
     frames = listen(bus)
     bus.send(0x201, b"\x0f\x00")
@@ -99,16 +102,16 @@ async def test_frames_go_through_the_adapter_both_ways(adapter: Adapter) -> None
     assert (adapter.frames, frames) == (["t20120F00", "r7010"], [(0x181, b"\x63\x06")])
     assert adapter.commands[-2:] == ["O", "O"]
     assert "S6" in adapter.commands
-    await bus.close()
 
 
 @pytest.mark.parametrize(
     "garbage",
     [b"\xff\xfe\r", b"t\r", b"t1\r", b"tXYZ2\r", b"t1812zz\r", b"t1819001122334455667788\r", b"d123F00\r", b"\a"],
 )
-async def test_after_an_adapters_garbage_the_next_frame_gets_through(adapter: Adapter, garbage: bytes) -> None:
+async def test_after_an_adapters_garbage_the_next_frame_gets_through(
+    adapter: Adapter, bus: PythonCanBus, garbage: bytes
+) -> None:
     adapter.plug_in()
-    bus = bus_of(adapter)
     await bus.open()
     frames = listen(bus)
     adapter.say(garbage)
@@ -117,14 +120,12 @@ async def test_after_an_adapters_garbage_the_next_frame_gets_through(adapter: Ad
     await until(lambda: bool(frames))
     assert frames == [(0x181, b"\x63\x06")]
     assert bus.down is None
-    await bus.close()
 
 
 async def test_an_adapter_that_is_unplugged_is_opened_again_when_it_is_back(
-    adapter: Adapter, caplog: pytest.LogCaptureFixture
+    adapter: Adapter, bus: PythonCanBus, caplog: pytest.LogCaptureFixture
 ) -> None:
     adapter.plug_in()
-    bus = bus_of(adapter)
     await bus.open()
     frames = listen(bus)
     with caplog.at_level(logging.ERROR):
@@ -140,12 +141,12 @@ async def test_an_adapter_that_is_unplugged_is_opened_again_when_it_is_back(
     bus.send(0x202)
     await until(lambda: bool(frames) and bool(adapter.frames))
     assert (frames, adapter.frames, bus.counters.dropped_stale) == ([(0x181, b"")], ["t2020"], 1)
-    await bus.close()
 
 
-async def test_a_bus_that_is_closed_while_its_adapter_is_away_opens_no_more(adapter: Adapter) -> None:
+async def test_a_bus_that_is_closed_while_its_adapter_is_away_opens_no_more(
+    adapter: Adapter, bus: PythonCanBus
+) -> None:
     adapter.plug_in()
-    bus = bus_of(adapter)
     await bus.open()
     await until(lambda: adapter.commands[-1:] == ["O"])
     adapter.unplug()
@@ -159,14 +160,13 @@ async def test_a_bus_that_is_closed_while_its_adapter_is_away_opens_no_more(adap
     assert bus.counters.sent == 0
 
 
-async def test_an_adapter_that_is_missing_is_told(adapter: Adapter) -> None:
+async def test_an_adapter_that_is_missing_is_told(adapter: Adapter, bus: PythonCanBus) -> None:
     with pytest.raises(BusOff, match="ttyCAN is down or missing"):
-        await bus_of(adapter).open()
+        await bus.open()
 
 
-async def test_an_empty_line_does_not_hold_up_the_loop(adapter: Adapter) -> None:
+async def test_an_empty_line_does_not_hold_up_the_loop(adapter: Adapter, bus: PythonCanBus) -> None:
     adapter.plug_in()
-    bus = bus_of(adapter)
     await bus.open()
     listen(bus)
     loop = asyncio.get_running_loop()
@@ -174,7 +174,6 @@ async def test_an_empty_line_does_not_hold_up_the_loop(adapter: Adapter) -> None
     for _ in range(100):
         bus._receive_all()
     assert loop.time() - began < 0.05
-    await bus.close()
 
 
 def test_without_pyserial_the_line_that_installs_it_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
