@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 
 from drivers.epos.serial_answers import Answer, parse_answer
-from drivers.epos.serial_frames import FAILED, OKAY, UNANSWERED, Frame, frame_size, parse_frame
+from drivers.epos.serial_frames import FAILED, OKAY, UNANSWERED, Frame, frame_size, make_read_object, parse_frame
 from drivers.simulated.bus import SimulatedBus
 from drivers.simulated.network import SimulatedNetwork
 from drivers.simulated.serial import EposTiming, SimulatedSerial
@@ -17,6 +17,8 @@ PROFILE = load("max2d").profile
 BOOTED_S = 0.2
 USUAL = EposTiming()
 OK, FAIL = bytes((OKAY,)), bytes((FAILED,))
+STATUSWORD = make_read_object(1, 0x6041, 0)
+ENCODER_POSITION = make_read_object(5, 0x6004, 0)
 
 
 class Silence(Exception):
