@@ -7,6 +7,7 @@ from collections.abc import Callable
 from random import Random
 
 from drivers.epos.serial_answers import make_can_frame_answer, make_done_answer, make_read_answer
+from drivers.epos.serial_conversation import Transport
 from drivers.epos.serial_frames import (
     UNANSWERED,
     Frame,
@@ -14,13 +15,22 @@ from drivers.epos.serial_frames import (
     RequestCanFrame,
     WriteObject,
     frame_size,
+    make_read_object,
+    make_send_nmt,
+    make_write_object,
     parse_frame,
     parse_request,
 )
+from drivers.epos.serial_line import SerialLine
 
 OPCODES = (0x0E, 0x10, 0x11, 0x12, 0x13, 0x14, 0x15, 0x20, 0x21)
 DEAD_NODE = 99
 PATIENCE_S = 0.5
+BAUD = 115200
+BYTE_S = 10 / BAUD
+STATUSWORD = make_read_object(1, 0x6041, 0)
+CONTROLWORD = make_write_object(1, 0x6040, 0, b"\x06\x00")
+START_ALL = make_send_nmt(0, 1)
 
 
 class Wire:
@@ -155,3 +165,11 @@ class Drive:
 
     def _take_end(self, byte: int) -> None:
         self._await(self._take_opcode, None)
+
+
+def now() -> float:
+    return asyncio.get_running_loop().time()
+
+
+def a_line(drive: Transport) -> SerialLine:
+    return SerialLine(drive, BAUD, "ttyTEST")
