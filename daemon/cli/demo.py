@@ -59,12 +59,12 @@ def demo(
     """
     from daemon import demo_turtle
     from daemon.demo import FIGURES, Demo
-    from daemon.runtime.clock import run_precise, run_virtual
+    from daemon.runtime.clock import run_patient, run_virtual
     from profiles.loader import load
 
     if figure == NXT:
-        return _nxt(load(profile or NXT).profile, seed, out, json, run_virtual if virtual_time else run_precise)
-    runner = run_virtual if virtual_time else run_precise
+        return _nxt(load(profile or NXT).profile, seed, out, json, run_virtual if virtual_time else run_patient)
+    runner = run_virtual if virtual_time else run_patient
     if figure in (*SEMITRAILER, *ACKERMANN, PATH_IN_PIECES):
         if out is not None:
             _make_folder(out)

@@ -311,6 +311,8 @@ def _cycle_finding(cycle: Mapping[str, Any], earlier: Mapping[str, Any], pid: in
     cycles, late = cycle.get("cycles", 0), cycle.get("late_cycles", 0)
     worst_ms, period_ms = cycle.get("max_lateness_ms", 0.0), 1e3 / cycle.get("hz", 100.0)
     found = f"{late} of {cycles} control cycles were late, the worst one began {worst_ms:.1f} ms late"
+    if waited_s := round(cycle.get("stood_still_s", 0.0), 1):
+        found += f"; the machine kept the simulated robot and its daemon waiting for {waited_s} s"
     mend = f"give it a real-time priority: sudo chrt -f -p 50 {pid}"
     if late > max(FEW_LATE, LATE_SHARE * cycles):
         return _counted("cycle", found, mend, goes_on=_goes_on(cycle, earlier))

@@ -73,7 +73,7 @@ def run(
             signal.signal(number, _end_before_it_began)
     from daemon.app import App, GatewayAccess
     from daemon.runtime.activation import inherited_sockets
-    from daemon.runtime.clock import run_precise
+    from daemon.runtime.clock import run_patient
     from profiles.loader import load
 
     chosen = _bus(bus, simulate=simulate)
@@ -103,7 +103,7 @@ def run(
         runs=_store(runs, runs_mb, robot.name),
         profile_file=loaded.path.resolve() if loaded else None,
     )
-    runner: Callable[[Coroutine[Any, Any, str]], str] = run_precise if simulates(chosen) else asyncio.run
+    runner: Callable[[Coroutine[Any, Any, str]], str] = run_patient if simulates(chosen) else asyncio.run
     say(runner(_live(make_app, profile, robot)))
     return 0
 

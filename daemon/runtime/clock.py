@@ -1,7 +1,8 @@
-"""The one clock: virtual time for tests, demos and campaigns, and the ticker that paces the control cycle.
+"""The one clock: virtual time, patient time for simulated robots, and the ticker that paces the control cycle.
 
 Time is the running loop's ``time()``. On a :class:`VirtualTimeLoop` it starts at zero and jumps to the next timer as
-soon as nothing is ready, so a program runs as fast as the processor goes and the same way each time.
+soon as nothing is ready, so a program runs as fast as the processor goes and the same way each time. On a
+:class:`PatientLoop` it is real time without that in which the machine let the process wait.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import time
 from collections.abc import Callable, Coroutine
 from concurrent.futures import Executor
 from contextvars import Context
-from selectors import SelectSelector
+from selectors import SelectorKey, SelectSelector
 from typing import Any, TypeVar, TypeVarTuple, Unpack
 
 T = TypeVar("T")
@@ -124,6 +125,70 @@ def run_precise(coro: Coroutine[Any, Any, T]) -> T:
         return runner.run(coro)
 
 
+class PatientLoop(asyncio.SelectorEventLoop):
+    """An event loop whose clock stands still while the machine keeps it waiting, for robots simulated in its process.
+
+    A busy machine lets a process wait for hundreds of milliseconds. A real robot goes on meanwhile and has to be
+    stopped; a simulated one waits with its master, so neither is to take the other for dead. What the process itself
+    computes counts as time; what it spends without a processor, or blocked in a call, beyond ``GRACE_S`` at once does
+    not.
+
+    Attributes:
+        stood_still_s: how much was left out since the loop was made.
+    """
+
+    GRACE_S = 0.001
+
+    def __init__(self) -> None:
+        self.stood_still_s = 0.0
+        self._seen_s, self._seen_processor_s = time.monotonic(), time.thread_time()
+        super().__init__(_PatientSelector(self))
+
+    def time(self) -> float:
+        """Seconds of a clock that never goes back; its zero is the monotonic clock's."""
+        now_s, processor_s = time.monotonic(), time.thread_time()
+        self._leave_out(now_s - self._seen_s - (processor_s - self._seen_processor_s))
+        self._seen_s, self._seen_processor_s = now_s, processor_s
+        return now_s - self.stood_still_s
+
+    def slept(self, wanted_s: float | None) -> None:
+        """A sleep has ended that was to last ``wanted_s`` at most; None: as long as it takes."""
+        now_s = time.monotonic()
+        if wanted_s is not None:
+            self._leave_out(now_s - self._seen_s - max(wanted_s, 0.0))
+        self._seen_s, self._seen_processor_s = now_s, time.thread_time()
+
+    def _leave_out(self, waited_s: float) -> None:
+        if waited_s > self.GRACE_S:
+            self.stood_still_s += waited_s - self.GRACE_S
+
+
+class _PatientSelector(SelectSelector):
+    """Tells its loop how long it was to sleep. Select(2) waits in microseconds and serves up to 1024 descriptors."""
+
+    def __init__(self, loop: PatientLoop) -> None:
+        super().__init__()
+        self._loop = loop
+
+    def select(self, timeout: float | None = None) -> list[tuple[SelectorKey, int]]:
+        self._loop.time()
+        events = super().select(timeout)
+        self._loop.slept(timeout)
+        return events
+
+
+def run_patient(coro: Coroutine[Any, Any, T]) -> T:
+    """Run a coroutine to its end on a :class:`PatientLoop`, as ``asyncio.run`` does in real time."""
+    with asyncio.Runner(loop_factory=PatientLoop) as runner:
+        return runner.run(coro)
+
+
+def stood_still_s() -> float:
+    """What the running loop's clock has left out, see :class:`PatientLoop`; 0 on any other loop."""
+    loop = asyncio.get_running_loop()
+    return loop.stood_still_s if isinstance(loop, PatientLoop) else 0.0
+
+
 class Ticker:
     """Calls back once per period, at absolute deadlines that never drift.
 
@@ -167,7 +232,7 @@ class Ticker:
         self._loop = asyncio.get_running_loop()
         self._start_s = self._loop.time()
         self._due = 0
-        if isinstance(self._loop, VirtualTimeLoop):
+        if isinstance(self._loop, VirtualTimeLoop | PatientLoop):  # their clocks are not the kernel's
             self._timer = self._loop.call_at(self._start_s + self.period_s, self._on_timer)
         else:
             self._fd = _periodic_timerfd(self._start_s + self.period_s, self.period_s)
@@ -184,21 +249,28 @@ class Ticker:
             self._fd = -1
 
     def _on_timer(self) -> None:
-        self._due += 1
-        self._timer = self._loop.call_at(self._start_s + (self._due + 1) * self.period_s, self._on_timer)
-        self.ticks += 1
-        self._callback()
+        late_s = self._loop.time() - self._deadline_s(self._due + 1)
+        expired = 1 + max(0, int(late_s / self.period_s))
+        self._timer = self._loop.call_at(self._deadline_s(self._due + expired + 1), self._on_timer)
+        self._tick(expired)
 
     def _on_timerfd(self) -> None:
         try:
             expired = int.from_bytes(os.read(self._fd, 8), "little")
         except BlockingIOError:
             return
+        self._tick(expired)
+
+    def _deadline_s(self, tick: int) -> float:
+        return self._start_s + tick * self.period_s
+
+    def _tick(self, expired: int) -> None:
+        """Call back once for all the ticks whose time has come."""
+        lateness_s = self._loop.time() - self._deadline_s(self._due + 1)
         self._due += expired
         self.missed += expired - 1
-        lateness = self._loop.time() - (self._start_s + (self._due - expired + 1) * self.period_s)
-        self.max_lateness_s = max(self.max_lateness_s, lateness)
-        self.late += lateness > 0.5 * self.period_s
+        self.max_lateness_s = max(self.max_lateness_s, lateness_s)
+        self.late += lateness_s > 0.5 * self.period_s
         self.ticks += 1
         self._callback()
 

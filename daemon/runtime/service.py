@@ -8,6 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from daemon.runtime.clock import stood_still_s
 from daemon.runtime.commands import Commands
 from daemon.runtime.cycle import Cycle
 from daemon.runtime.localising import Localiser
@@ -124,4 +125,5 @@ class Service:
             "late_cycles": counters.late_cycles,
             "incomplete_cycles": counters.incomplete,
             "max_lateness_ms": round(counters.max_lateness_s * 1e3, 3),
+            "stood_still_s": round(stood_still_s(), 3),
         }

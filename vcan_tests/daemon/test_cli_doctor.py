@@ -125,6 +125,11 @@ def test_cycles_that_were_late_and_are_no_more_are_a_note() -> None:
     assert found.finding.endswith("none in the last 1 s")
 
 
+def test_the_time_for_which_a_simulated_robot_had_to_wait_is_told_with_the_cycle() -> None:
+    found = findings(cycle={"cycles": 10_000, "late_cycles": 0, "stood_still_s": 2.34})["cycle"]
+    assert (found.verdict, "waiting for 2.3 s" in found.finding) == ("ok", True)
+
+
 @pytest.mark.parametrize(("before", "verdict"), [(2, "problem"), (3, "note")])
 def test_requests_that_failed_inside_the_daemon_are_a_problem_while_they_do(before: int, verdict: str) -> None:
     assert findings({"api": {"internal_errors": before}}, api={"internal_errors": 3})["api"].verdict == verdict

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 import time
+from selectors import SelectorKey, SelectSelector
 
 import pytest
 
-from daemon.runtime.clock import Deadlock, Ticker, VirtualTimeLoop, run_precise, run_virtual
+from daemon.runtime.clock import Deadlock, Ticker, VirtualTimeLoop, run_patient, run_precise, run_virtual, stood_still_s
 
 
 async def test_tests_run_on_virtual_time() -> None:
@@ -222,3 +224,101 @@ async def test_missed_ticks_are_counted_and_not_made_up_for() -> None:
     assert ticker.ticks == 2
     assert ticker.missed >= 1
     assert ticker.max_lateness_s >= 0.01
+
+
+def block(seconds: float) -> None:
+    """What a machine without time for this process looks like to it."""
+    threading.Event().wait(seconds)
+
+
+def compute(seconds: float) -> None:
+    end_s = time.thread_time() + seconds
+    while time.thread_time() < end_s:
+        pass
+
+
+def test_a_patient_clock_stands_still_while_the_process_is_kept_waiting() -> None:
+    async def wait() -> tuple[float, float]:
+        loop = asyncio.get_running_loop()
+        began_s = loop.time()
+        block(0.2)
+        return loop.time() - began_s, stood_still_s()
+
+    took_s, left_out_s = run_patient(wait())
+    assert took_s < 0.1
+    assert left_out_s >= 0.199
+
+
+def test_a_patient_clock_counts_what_the_process_computes() -> None:
+    async def work() -> float:
+        loop = asyncio.get_running_loop()
+        began_s = loop.time()
+        compute(0.05)
+        return loop.time() - began_s
+
+    assert run_patient(work()) >= 0.05
+
+
+def test_a_sleep_that_the_machine_prolongs_ends_on_time_by_a_patient_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    select = SelectSelector.select
+
+    def oversleep(self: SelectSelector, timeout: float | None = None) -> list[tuple[SelectorKey, int]]:
+        events = select(self, timeout)
+        block(0.1)
+        return events
+
+    async def sleep() -> float:
+        loop = asyncio.get_running_loop()
+        began_s = loop.time()
+        await asyncio.sleep(0.02)
+        return loop.time() - began_s
+
+    monkeypatch.setattr(SelectSelector, "select", oversleep)
+    assert 0.02 <= run_patient(sleep()) < 0.06
+
+
+def test_a_patient_clock_never_goes_back() -> None:
+    async def watch() -> list[float]:
+        loop, times = asyncio.get_running_loop(), []
+        for _ in range(20):
+            times.append(loop.time())
+            block(0.003)
+            times.append(loop.time())
+            await asyncio.sleep(0.001)
+        return times
+
+    times = run_patient(watch())
+    assert times == sorted(times)
+
+
+def test_no_tick_of_a_patient_clock_is_missed_where_the_machine_stood_still() -> None:
+    async def tick() -> Ticker:
+        ticker = Ticker(0.02, lambda: block(0.05))
+        ticker.start()
+        await asyncio.sleep(0.13)
+        ticker.stop()
+        return ticker
+
+    ticker = run_patient(tick())
+    assert (ticker.ticks, ticker.missed) == (6, 0)
+
+
+def test_ticks_of_a_patient_clock_are_missed_where_the_process_computes_too_long() -> None:
+    async def tick() -> Ticker:
+        ticker = Ticker(0.02, lambda: compute(0.05))
+        ticker.start()
+        await asyncio.sleep(0.3)
+        ticker.stop()
+        return ticker
+
+    ticker = run_patient(tick())
+    assert ticker.missed >= ticker.ticks
+    assert ticker.late >= 1
+
+
+def test_other_clocks_leave_nothing_out() -> None:
+    async def left_out() -> float:
+        block(0.01)
+        return stood_still_s()
+
+    assert asyncio.run(left_out()) == run_virtual(left_out()) == 0.0
