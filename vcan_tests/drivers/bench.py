@@ -82,3 +82,11 @@ async def bench(profile: Profile | None = None, *, powered: bool = True) -> Asyn
     await made.devices.close()
     await made.master.close()
     await made.network.close()
+
+
+async def driving(b: Bench, speed_m_s: float = 0.4) -> None:
+    """All wheels at a speed."""
+    await asyncio.gather(*(drive.enable() for drive in b.devices.drives.values()))
+    for drive in b.devices.drives.values():
+        drive.command_speed(speed_m_s)
+    await asyncio.sleep(1.0)

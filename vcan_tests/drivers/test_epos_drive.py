@@ -1,116 +1,26 @@
-"""The EPOS driver against its twin."""
+"""The EPOS driver against its twin: enabling, stopping, faults."""
 
 from __future__ import annotations
 
 import asyncio
 import math
-from typing import Any
 
 import msgspec
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from canhelm.errors import DeviceFault, LimitExceeded, NotReady, Refused, Timeout, UsageError
-from drivers.canopen.master import Master
+from canhelm.errors import DeviceFault, Refused, Timeout
 from drivers.contract import DriveState, NodeState
-from drivers.epos.codec import RPDO1, TPDO1
-from drivers.epos.drive import EposDrive
+from drivers.epos.codec import RPDO1
 from drivers.epos.objects import OBJECTS
 from drivers.epos.state_machine import Mode, State
 from drivers.epos.transitions import differing_bits
-from drivers.epos.units import WheelUnits
-from drivers.simulated.bus import SimulatedBus
-from vcan_tests.drivers.bench import Bench, bench, max2d
+from vcan_tests.drivers.bench import Bench, bench, driving, max2d
 
 CONFIG = max2d().drives["front_left"]
-ENABLED, DISABLED = 0x0137, 0x0140
-
-
-def lonely_drive() -> EposDrive:
-    """A drive without a network, fed by hand."""
-    return EposDrive(Master(SimulatedBus().port("master"), max2d().network), "front_left", CONFIG)
-
-
-def feed(drive: EposDrive, time_s: float, position_qc: int, statusword: int = DISABLED) -> None:
-    position_qc = (position_qc + 2**31) % 2**32 - 2**31
-    receiver = drive.master.bus.receiver
-    assert receiver is not None
-    receiver(0x183, TPDO1.pack(statusword, position_qc, 0), time_s)
 
 
 def axis_speed(b: Bench, name: str = "front_left") -> float:
     return b.network.world.axes[name].speed_rad_s
-
-
-async def driving(b: Bench, speed_m_s: float = 0.4) -> None:
-    """All wheels at a speed."""
-    await asyncio.gather(*(drive.enable() for drive in b.devices.drives.values()))
-    for drive in b.devices.drives.values():
-        drive.command_speed(speed_m_s)
-    await asyncio.sleep(1.0)
-
-
-# --- units and readings ----------------------------------------------------------------------------------------------
-
-
-def test_a_turn_of_the_wheel_is_gear_times_encoder() -> None:
-    units = WheelUnits.of(CONFIG)
-    circumference_m = 2 * math.pi * CONFIG.wheel_radius_m
-    assert circumference_m / units.m_per_qc == pytest.approx(14 * 2 * 2000)
-    assert circumference_m * units.rpm_per_m_s == pytest.approx(60 * 14 * 2)
-
-
-def test_a_mirrored_motor_turns_the_other_way() -> None:
-    mirrored = WheelUnits.of(msgspec.structs.replace(CONFIG, direction=-1))
-    assert mirrored.rpm_per_m_s == -WheelUnits.of(CONFIG).rpm_per_m_s
-
-
-@given(st.floats(-5, 5))
-def test_speeds_at_rim_and_motor_are_inverse(speed_m_s: float) -> None:
-    drive = lonely_drive()
-    assert drive.speed_from_rpm(drive.rpm_from_speed(speed_m_s)) == pytest.approx(speed_m_s)
-
-
-@given(st.integers(-(2**31), 2**31 - 1), st.lists(st.integers(-900, 900), min_size=1, max_size=20))
-def test_travel_is_the_sum_of_the_steps_over_every_wrap(start_qc: int, steps: list[int]) -> None:
-    drive = lonely_drive()
-    feed(drive, 0.0, start_qc)
-    position = start_qc
-    for number, step in enumerate(steps, 1):
-        position += step
-        feed(drive, 0.01 * number, position)
-    assert drive.position_m == pytest.approx(sum(steps) * WheelUnits.of(CONFIG).m_per_qc)
-
-
-def test_speed_is_the_difference_over_two_intervals() -> None:
-    drive = lonely_drive()
-    for number in range(4):
-        feed(drive, 0.01 * number, 100 * number)
-    assert drive.speed_m_s == pytest.approx(100 * WheelUnits.of(CONFIG).m_per_qc / 0.01)
-
-
-def test_a_new_reference_is_no_travel() -> None:
-    drive = lonely_drive()
-    for number, position in enumerate((0, 100, 200, 500_000, 500_100, 500_200)):
-        feed(drive, 0.01 * number, position)
-    assert drive.position_m == pytest.approx(400 * WheelUnits.of(CONFIG).m_per_qc)
-    assert abs(drive.speed_m_s) < 0.2
-
-
-def test_a_reading_without_a_known_state_is_unknown() -> None:
-    drive = lonely_drive()
-    feed(drive, 0.0, 0, 0x0041)
-    assert drive.state is DriveState.UNKNOWN
-
-
-@given(st.binary(max_size=12))
-def test_no_frame_on_its_identifier_raises(data: bytes) -> None:
-    drive = lonely_drive()
-    receiver = drive.master.bus.receiver
-    assert receiver is not None
-    receiver(0x183, data, 0.0)
-    assert drive.master.counters.malformed == (len(data) != 8)
 
 
 # --- enabling --------------------------------------------------------------------------------------------------------
@@ -348,120 +258,3 @@ async def test_a_drive_that_leaves_operation_by_itself_is_a_fault() -> None:
         assert "left operation enabled by itself" in fault.message
         await asyncio.sleep(0.1)
         assert b.drive().state is DriveState.DISABLED
-
-
-# --- moves of the drive itself ---------------------------------------------------------------------------------------
-
-
-async def released(b: Bench) -> None:
-    """Let a single wheel turn: its pair's brake released."""
-    await b.brake("front").release()
-
-
-async def until_at_target(b: Bench) -> None:
-    for _ in range(300):
-        await asyncio.sleep(0.01)
-        if b.drive().at_target:
-            return
-    raise AssertionError("the move did not end")
-
-
-async def test_a_relative_move_ends_where_it_should() -> None:
-    async with bench() as b:
-        await released(b)
-        await b.drive().enable()
-        before = await b.drive().sdo.read_int(OBJECTS["position_actual_value"])
-        await b.drive().move_to(2000, relative=True, speed_rpm=300)
-        assert not b.drive().at_target
-        await until_at_target(b)
-        await asyncio.sleep(0.3)
-        after = await b.drive().sdo.read_int(OBJECTS["position_actual_value"])
-        assert after - before == pytest.approx(2000, abs=60)
-
-
-async def test_two_moves_in_a_row_are_both_made() -> None:
-    async with bench() as b:
-        await released(b)
-        await b.drive().enable()
-        for target in (1500, 0):
-            await b.drive().move_to(target, relative=False, speed_rpm=300)
-            await until_at_target(b)
-            await asyncio.sleep(0.3)
-        assert await b.drive().sdo.read_int(OBJECTS["position_actual_value"]) == pytest.approx(0, abs=60)
-
-
-async def test_a_move_needs_an_enabled_drive_at_rest() -> None:
-    async with bench() as b:
-        with pytest.raises(NotReady, match="motor enable"):
-            await b.drive().move_to(100, relative=True, speed_rpm=300)
-        await driving(b)
-        with pytest.raises(Refused, match="still turns"):
-            await b.drive().move_to(100, relative=True, speed_rpm=300)
-
-
-@pytest.mark.parametrize(("position_qc", "speed_rpm"), [(100, 0.0), (100, -5.0), (100, 99_999.0), (2**31, 300.0)])
-async def test_a_move_outside_its_limits_is_refused(position_qc: int, speed_rpm: float) -> None:
-    async with bench() as b:
-        await b.drive().enable()
-        with pytest.raises(LimitExceeded):
-            await b.drive().move_to(position_qc, relative=True, speed_rpm=speed_rpm)
-
-
-async def test_homing_at_the_present_position_ends_at_once() -> None:
-    async with bench() as b:
-        await b.drive().enable()
-        travel_m = b.drive().position_m
-        await b.drive().home(35)
-        await until_at_target(b)
-        assert b.drive().position_m == pytest.approx(travel_m, abs=0.02)
-
-
-async def test_a_current_turns_the_motor_and_zero_lets_it_go() -> None:
-    async with bench() as b:
-        await released(b)
-        await b.drive().enable()
-        await b.drive().set_current(0.8)
-        await asyncio.sleep(0.1)
-        assert b.drive().current_a == pytest.approx(0.8, abs=0.1)
-        await b.drive().set_current(0.0)
-        await asyncio.sleep(0.05)
-        assert b.drive().current_a == pytest.approx(0.0, abs=0.05)
-
-
-@pytest.mark.parametrize("current_a", [9.0, -9.0, math.nan])
-async def test_a_current_above_the_continuous_one_is_refused(current_a: float) -> None:
-    async with bench() as b:
-        await b.drive().enable()
-        with pytest.raises(LimitExceeded):
-            await b.drive().set_current(current_a)
-
-
-async def test_the_driving_mode_comes_back_with_a_zero_target() -> None:
-    async with bench() as b:
-        await b.drive().enable()
-        await b.drive().set_current(0.1)
-        await b.drive().use_driving_mode()
-        assert b.drive().mode is Mode.PROFILE_VELOCITY
-        assert await b.drive().sdo.read_int(OBJECTS["target_velocity"]) == 0
-        assert await b.drive().sdo.read_int(OBJECTS["current_mode_setting_value"]) == 0
-
-
-async def test_a_cyclic_target_does_not_disturb_a_move() -> None:
-    async with bench() as b:
-        await b.drive().enable()
-        await b.drive().set_current(0.0)
-        b.drive().command_speed(1.0)
-        assert b.drive().target_speed_m_s == 0.0
-
-
-async def test_status_is_plain_data() -> None:
-    async with bench() as b:
-        status: dict[str, Any] = b.drive().status()
-        assert msgspec.json.decode(msgspec.json.encode(status)) == status
-        assert {"node", "name", "node_state", "state", "velocity_rpm", "speed_m_s", "current_a", "fault"} <= set(status)
-
-
-async def test_text_is_no_number() -> None:
-    async with bench() as b:
-        with pytest.raises(UsageError, match="no number"):
-            await b.drive().sdo.read_int(OBJECTS["device_name"])
