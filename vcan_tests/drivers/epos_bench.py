@@ -27,6 +27,8 @@ SHUTDOWN, SWITCH_ON, ENABLE, QUICK_STOP, DISABLE_VOLTAGE, RESET = 0x06, 0x07, 0x
 SWITCH_ON_DISABLED, READY_TO_SWITCH_ON, SWITCHED_ON, REFRESH = 0x140, 0x121, 0x123, 0x4123
 OPERATION_ENABLED, QUICK_STOP_ACTIVE, FAULT, FAULT_REACTION = 0x137, 0x117, 0x108, 0x11F
 START, STOP, PRE_OPERATIONAL, RESET_NODE, RESET_COMMUNICATION = 1, 2, 128, 129, 130
+TARGET_REACHED, BIT_12, BIT_13, REFERENCED = 0x0400, 0x1000, 0x2000, 0x8000
+HOMING, VELOCITY_PROFILE, POSITION_PROFILE, POSITION, VELOCITY, CURRENT = 6, 3, 1, -1, -2, -3
 
 
 def drive_config(node: int = 1) -> DriveConfig:
@@ -228,3 +230,9 @@ class Bench:
     def emergencies(self) -> list[int]:
         """Codes of the EMCYs heard."""
         return [int.from_bytes(data[:2], "little") for data in self.master.of(0x80 + self.node)]
+
+
+async def enabled(mode: int) -> Bench:
+    bench = await Bench.booted()
+    await bench.enable(mode)
+    return bench
