@@ -133,6 +133,15 @@ def build_app() -> App:
     return app
 
 
+def whole_app() -> App:
+    """The command line with every command loaded: the overview shows the first line of each one's own help."""
+    app = build_app()
+    for commands in COMMANDS.values():
+        for name in commands:
+            app[name]
+    return app
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command.
 
@@ -173,15 +182,8 @@ def _throw_output_away() -> None:
 def _run(argv: Sequence[str]) -> int:
     app = build_app()
     if not argv or argv[0] in app.help_flags:
-        _load_all(app)
+        app = whole_app()
     result = app(list(argv), exit_on_error=False, print_error=False, result_action="return_value")
     if len(argv) == 1 and argv[0] in NOUNS:
         return UsageError.exit_code  # it has shown its help
     return result if isinstance(result, int) else 0
-
-
-def _load_all(app: App) -> None:
-    """Load every command: the overview shows the first line of each one's own help."""
-    for commands in COMMANDS.values():
-        for name in commands:
-            app[name]
