@@ -9,8 +9,9 @@ from drivers.explain_codes import DICTIONARIES
 HEAD = """# Objects
 
 The object dictionaries of the devices that canhelm drives: index and sub-index, name, type, access through SDO, unit,
-value after power-up, meaning. `canhelm object show NAME` tells the same in a terminal, `canhelm sdo read NODE NAME` asks
-a device. Objects marked *later* are of firmware later than 2011h: `canhelm sdo read` tells whether a drive has them.
+value after power-up, meaning. `canhelm object show NAME` tells the same in a terminal, `canhelm sdo read NODE NAME`
+asks a device. Objects marked *later* are of firmware later than 2011h: `canhelm sdo read` tells whether a drive has
+them.
 
 """
 COLUMNS = ("object", "name", "type", "access", "unit", "default", "meaning")
