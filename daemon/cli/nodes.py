@@ -80,7 +80,7 @@ def find(*, options: Options = DEFAULT) -> None:
 
 @app.command
 def set_id(device: Device, node_id: int, /, *, yes: Yes = False, options: Options = DEFAULT) -> None:
-    """Give a device with LSS (an encoder) another node id and let it store it. It asks first.
+    """Give a drive, or a device with LSS (an encoder), another node id and let it store it. It asks first.
 
     Example: `canhelm nodes set-id 127 5`
 

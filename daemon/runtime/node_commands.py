@@ -8,9 +8,10 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 from canhelm.errors import Aborted, NodeAbsent, Refused, Timeout, UsageError
+from daemon.runtime.epos_node_id import set_node_id
 from daemon.runtime.handlers import Handler, Params, node_number
 from daemon.runtime.interlocks import require_all_disabled
-from daemon.runtime.node_report import FIRMWARE, bit_rate_remark, missing_entry, node_entry
+from daemon.runtime.node_report import FIRMWARE, VENDOR_MAXON, bit_rate_remark, missing_entry, node_entry
 from daemon.runtime.supervisor import Supervisor
 from drivers.canopen.codes import NmtCommand
 from drivers.canopen.lss import Identity, LssMaster, parse_identity
@@ -169,13 +170,19 @@ class NodeCommands:
         async def change(lss: LssMaster) -> None:
             await lss.set_node_id(new)
 
-        old = await self._set_up(str(params["device"]), change)
-        if old is not None:
-            self._supervisor.master.send_nmt(NmtCommand.RESET_COMMUNICATION, old)
+        device, master = str(params["device"]), self._supervisor.master
+        old = self._node_of(device)
+        if old is not None and await self._is_epos(old):
+            async with self._stopped(old):
+                await set_node_id(master, old, new)
+        else:
+            await self._set_up(device, change)
+            if old is not None:
+                master.send_nmt(NmtCommand.RESET_COMMUNICATION, old)
         for _ in range(ATTEMPTS):
             await asyncio.sleep(SETTLE_S)
             if await self._is_there(new):
-                return {"device": params["device"], "node": new, "note": f"node {new} answers"}
+                return {"device": device, "node": new, "note": f"node {new} answers"}
         raise NodeAbsent(
             f"the device has stored node id {new}, but does not answer", node=new, remedy="switch it off and on"
         )
@@ -192,11 +199,24 @@ class NodeCommands:
         note = f"stored; it counts when the device was switched off and on, on a network of {bit_rate} bit/s"
         return {"device": params["device"], "bit_rate": bit_rate, "note": note}
 
-    async def _set_up(self, device: str, change: Callable[[LssMaster], Awaitable[None]]) -> int | None:
-        """Change and store something in one device; its node id before, or None where it was named by its identity."""
-        identity, node = parse_identity(device), None
+    def _node_of(self, device: str) -> int | None:
+        """Its node id; None where it is named by its identity."""
+        if parse_identity(device) is not None:
+            return None
+        return node_number(self._supervisor, int(device, 0) if device.lower().startswith("0x") else device)
+
+    async def _is_epos(self, node: int) -> bool:
+        try:
+            vendor = await self._supervisor.master.sdo(node).read_raw(IDENTITY["vendor_id"])
+        except Aborted:
+            return False
+        return int.from_bytes(vendor, "little") == VENDOR_MAXON
+
+    async def _set_up(self, device: str, change: Callable[[LssMaster], Awaitable[None]]) -> None:
+        """Change and store something in one device with LSS."""
+        identity, node = parse_identity(device), self._node_of(device)
         if identity is None:
-            node = node_number(self._supervisor, int(device, 0) if device.lower().startswith("0x") else device)
+            assert node is not None
             identity = await self._identity_of(node)
         async with self._lss_turn, self._stopped(node):
             lss = self._supervisor.master.lss
@@ -206,7 +226,6 @@ class NodeCommands:
                 await lss.store()
             finally:
                 lss.switch_global(False)
-        return node
 
     @asynccontextmanager
     async def _stopped(self, node: int | None) -> AsyncIterator[None]:
@@ -229,7 +248,7 @@ class NodeCommands:
                 f"node {node} does not tell its whole identity, so LSS cannot single it out",
                 node=node,
                 object=error.object,
-                remedy="an EPOS takes its id from its DIP switches; give another device's identity by hand",
+                remedy="an EPOS has no LSS; give another device's identity by hand",
             ) from None
 
     async def _is_there(self, node: int) -> bool:

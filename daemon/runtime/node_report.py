@@ -60,8 +60,8 @@ def _remark(found: FoundNode) -> str:
     if seen.two_nodes:
         heard = f"{seen.doubled} doubled answers ({seen.differing} of them differ), {seen.boot_ups} boot-ups"
         return (
-            f"two nodes have this id: {heard}; give one of them another id: DIP switches of an EPOS, "
-            "`canhelm nodes set-id` for an encoder that is alone on the bus"
+            f"two nodes have this id: {heard}; take one of them from the bus (pull its plug) and give the other one "
+            f"its id: `canhelm nodes set-id {found.node} ID`, or by DIP switches, off and on"
         )
     if seen.state == NmtState.STOPPED:
         return f"stopped, so it does not say what it is: `canhelm nmt preop {found.node}`, then scan again"

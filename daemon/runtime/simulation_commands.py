@@ -46,9 +46,14 @@ class SimulationCommands:
     async def _power(self, params: Params, lease: str | None) -> dict[str, Any]:
         network = self._simulated("its power is switched by hand")
         named, on = params["node"], bool(params["on"])
-        node = named if named == "all" or named in self._supervisor.devices.bricks else self._member(named)
+        if named != "all" and named not in self._supervisor.devices.bricks:
+            self._member(named)
         switch = network.power_on if on else network.power_off
-        switch(node)
+        try:
+            switch(named)
+        except KeyError:
+            remedy = "`canhelm nodes scan` shows who has which id; call it by its name"
+            raise NodeAbsent(f"no simulated node has the id {named}", node=named, remedy=remedy) from None
         return {"node": params["node"], "on": on}
 
     async def _input(self, params: Params, lease: str | None) -> dict[str, Any]:

@@ -174,7 +174,7 @@ class NodeBoot:
             self._guarded = None
 
     def _ready(self) -> None:
-        self._last_told = ""
+        self._last_told, self._wrong_toggle = "", False
         device = self._device
         device.node_state = NodeState.READY
         device.status_sentence = f"{self._who} is ready"
@@ -225,8 +225,9 @@ class NodeBoot:
             self._master.counters.toggle_errors += 1
             if not self._wrong_toggle:
                 message = f"{self._who}: toggle bit of its guarding answer did not alternate"
-                self._master.tell(self._node, "toggle", "warning", message, "look for a second node with this id")
-        self._wrong_toggle = not alternates
+                remedy = "`canhelm nodes scan` tells whether two nodes have this id"
+                self._master.tell(self._node, "toggle", "warning", message, remedy)
+            self._wrong_toggle = True
         if state == NmtState.OPERATIONAL:
             if self._guarded is not None and not self._guarded.done():
                 self._guarded.set_result(None)

@@ -107,6 +107,11 @@ class SimulatedDictionary:
         entry = self.table[name]
         return int(self.values[entry.index, entry.sub])
 
+    def kept_number(self, name: str) -> int:
+        """What the next restart finds in a numeric object."""
+        address = self.address(name)
+        return int(self._stored.get(address, self._factory[address]))
+
     def find(self, index: int, sub: int) -> ObjectDef:
         """The entry at an address. Raises SdoAbort for an unknown index or sub-index."""
         entry = self.objects.get((index, sub))

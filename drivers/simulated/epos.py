@@ -5,7 +5,7 @@ Oddities that matter to a master: factory COB-IDs of the PDOs are those of node 
 heartbeat; the position counter starts at 0 at each restart.
 
 Source: maxon EPOS Firmware Specification, Communication Guide, Hardware Reference. Not modelled: modes -4, -5 and -6
-(writing them to 0x6060 is refused), the data recorder, bit-rate and node-id changes (stored only).
+(writing them to 0x6060 is refused), the data recorder, bit-rate changes (stored only).
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class SimulatedEpos(SimulatedNode):
 
     Args:
         port: its connection to the bus.
-        config: the drive of the profile.
+        config: the drive of the profile; its DIP switches are set to its node id.
         axis: the motor's shaft.
         world: the physics that the shaft belongs to.
         boot_delay_s: time from power-up to the boot-up message.
@@ -64,6 +64,7 @@ class SimulatedEpos(SimulatedNode):
         motion: its motion control.
         homing: its homing mode.
         outputs: its digital outputs.
+        dip_switches: node id that they are set to; 0, all off, for the id in object 0x2000.
         on_power_stage: called with True when the power stage is switched on, with False when off.
     """
 
@@ -82,6 +83,7 @@ class SimulatedEpos(SimulatedNode):
         self._measurements = Measurements(
             self.motion, config.motor.pole_pairs, lambda: self._settings.rad_s_per_rpm, seed
         )
+        self.dip_switches = config.node
         self._world = world
         self._word = 0
         self._sensor = (0, 0)
@@ -144,6 +146,11 @@ class SimulatedEpos(SimulatedNode):
     def before_access(self, now_s: float) -> None:
         """Bring the world up to this moment, so that the past is computed with the past's commands."""
         self._world.advance(now_s)
+
+    def before_start(self, whole: bool) -> None:
+        """At power-up and at a reset the node id is taken from the DIP switches, or from the memory."""
+        if whole:
+            self.take_node_id(self.dip_switches or self.dictionary.kept_number("node_id_software"))
 
     def application_started(self) -> None:
         """Boot: position 0, set values and parameters as power-up finds them, state Switch On Disabled."""

@@ -24,12 +24,16 @@ from drivers.simulated.scanner import SimulatedScanner
 from drivers.simulated.semitrailer import SemitrailerWorld
 from drivers.simulated.stand import StandWorld
 from profiles.bricks import DifferentialGeometry
+from profiles.own_class import load_class
+from profiles.own_vehicle import OwnGeometry
 from profiles.schema import BrakeConfig, OmniGeometry, Profile
 from profiles.sensors import SensorDefects
 from profiles.steered import CarGeometry, SemitrailerGeometry
 
 FACTORY_NODE = 1
-"""Node id of a drive whose DIP switches nobody has set."""
+"""Node id of a drive that nobody has set up."""
+ALL_OFF = 0
+"""Its DIP switches."""
 _BOOT_DELAY_S = (0.05, 0.15)
 """Shortest and longest time from power-up to the boot-up message (assumed)."""
 _WATCH_S = 0.01
@@ -44,7 +48,10 @@ def make_world(profile: Profile, seed: int) -> BodyWorld:
         return AckermannWorld(profile, seed)
     if isinstance(profile.vehicle, SemitrailerGeometry):
         return SemitrailerWorld(profile, seed)
-    if profile.vehicle is None or isinstance(profile.vehicle, DifferentialGeometry):
+    if isinstance(profile.vehicle, OwnGeometry) and profile.vehicle.twin is not None:
+        world: BodyWorld = load_class(profile.vehicle.twin)(profile, seed)
+        return world
+    if profile.vehicle is None or isinstance(profile.vehicle, DifferentialGeometry | OwnGeometry):
         return StandWorld(profile, profile.drives, seed)
     return Max2dWorld(profile, seed)
 
@@ -90,6 +97,7 @@ class SimulatedNetwork:
         }
         for name in factory:
             self.drives[name].dictionary.forget()
+            self.drives[name].dip_switches = ALL_OFF
         defects = simulation.sensors if simulation else {}
         self.encoders = {
             name: SimulatedEncoder(

@@ -10,15 +10,19 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
 from canhelm.errors import Interlock, NodeAbsent, Refused, UsageError
 from daemon.cli.main import main
 from drivers.simulated.encoder import SimulatedEncoder
 from drivers.simulated.lss_slave import UNCONFIGURED
+from profiles.loader import load
 from profiles.schema import EncoderConfig
 from vcan_tests.daemon.fake_backend import FakeBackend, served
 from vcan_tests.robot import Robot, running_robot
+
+MAX2D = load("max2d").profile
 
 
 def new_encoder(robot: Robot, node: int) -> SimulatedEncoder:
@@ -233,11 +237,35 @@ async def test_a_node_id_that_is_taken_is_not_given() -> None:
             await robot.call("lss.set_node_id", device="front", node_id=3, confirm=True)
 
 
-async def test_a_drive_has_no_lss_and_the_answer_says_where_its_id_comes_from() -> None:
-    async with running_robot() as robot:
-        with pytest.raises(Refused, match="whole identity") as refusal:
-            await robot.call("lss.set_node_id", device="front_left", node_id=41, confirm=True)
-        assert "DIP" in str(refusal.value.remedy)
+async def test_dip_switches_that_give_a_drive_its_id_are_named() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        with pytest.raises(Refused, match="DIP switches of node 3") as refusal:
+            await robot.call("lss.set_node_id", device="front_left", node_id=40, confirm=True)
+        assert "set them to 40" in str(refusal.value.remedy)
+        await robot.until(lambda: robot.state == "idle")
+        robot.network.drives["front_left"].dip_switches = 0
+        robot.network.power_off(3)
+        robot.network.power_on("front_left")
+        await asyncio.sleep(0.3)
+        assert robot.network.drives["front_left"].node_id == 1  # its memory is as before
+
+
+async def test_a_drive_from_the_factory_gets_its_id_once_its_twin_is_off_the_bus() -> None:
+    assert MAX2D.simulation is not None
+    simulation = msgspec.structs.replace(MAX2D.simulation, factory=("front_left",))
+    built = msgspec.structs.replace(MAX2D, simulation=simulation)
+    async with running_robot(built=built, booted=False, expect_errors=True) as robot:
+        await asyncio.sleep(2.0)
+        set_id = {"device": "1", "node_id": 3, "confirm": True}
+        with pytest.raises(Refused, match="two drives have node id 1"):
+            await robot.call("lss.set_node_id", **set_id)
+        await robot.call("simulation.power", node="rear_right", on=False)
+        assert (await robot.call("lss.set_node_id", **set_id))["note"] == "node 3 answers"
+        await robot.call("simulation.power", node="rear_right", on=True)
+        await robot.call("simulation.power", node="front_left", on=False)
+        await robot.call("simulation.power", node="front_left", on=True)
+        await robot.until(lambda: "motor_type" in robot.app.devices.by_node[3].status_sentence)
+        await robot.until(lambda: robot.app.devices.by_node[1].node_state == "ready")
 
 
 async def test_where_nobody_is_without_an_id_nobody_is_found() -> None:
