@@ -267,7 +267,7 @@ def _factory(data: dict[str, Any]) -> Iterator[Finding]:
 
 def _localisation(data: dict[str, Any]) -> Iterator[Finding]:
     kind = part(data, "vehicle").get("type")
-    if part(data, "localisation") and kind in (None, "omni"):
+    if part(data, "localisation") and kind in (None, "omni", "own"):
         yield Finding(("localisation",), "has no vehicle with an odometry to correct", "leave it out")
     if part(part(data, "localisation"), "scanner").get("on") == "trailer" and kind != "semitrailer":
         yield Finding(("localisation", "scanner", "on"), "there is no trailer", "write on: vehicle")

@@ -12,9 +12,11 @@ from typing import Any
 
 import msgspec
 
-from profiles import bricks, localisation, schema, sensors, steered
+from profiles import bricks, localisation, own_vehicle, schema, sensors, steered
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
+_MODULES = (schema, bricks, steered, sensors, localisation, own_vehicle)
+"""Where the schema's classes stand."""
 _NAME = {"type": "string"}
 EXTENDS = {
     "anyOf": [_NAME, {"type": "array", "items": _NAME}],
@@ -51,7 +53,7 @@ def _allow_extends(node: Any) -> None:
 
 def _descriptions() -> dict[str, dict[str, str]]:
     """Docstring of every field, by class and field."""
-    trees = [ast.parse(inspect.getsource(module)) for module in (schema, bricks, steered, sensors, localisation)]
+    trees = [ast.parse(inspect.getsource(module)) for module in _MODULES]
     classes = [node for tree in trees for node in tree.body if isinstance(node, ast.ClassDef)]
     return {node.name: _field_descriptions(node) for node in classes}
 

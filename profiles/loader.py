@@ -12,7 +12,7 @@ from pathlib import Path
 import msgspec
 
 from canhelm.errors import ConfigError
-from profiles import catalogue, checks, feasibility
+from profiles import catalogue, checks, feasibility, own_class
 from profiles.provenance import Listing, Mapping, Mistake, Node, Place, Reader, Scalar, leaves, merge
 from profiles.schema import Profile
 from profiles.shape import Shape
@@ -206,7 +206,7 @@ def _checked(tree: Node | None, mistakes: list[Mistake]) -> tuple[Profile | None
     if not isinstance(tree, Mapping):
         return None, []
     data = Shape(mistakes).walk(tree, _PROFILE_TYPE)
-    findings = [*checks.findings(data, tree.complete), *feasibility.findings(data)]
+    findings = [*checks.findings(data, tree.complete), *feasibility.findings(data), *own_class.findings(data)]
     warnings = [finding.located(tree) for finding in findings if finding.warning]
     mistakes += [finding.located(tree) for finding in findings if not finding.warning]
     return None if mistakes else msgspec.convert(data, Profile), warnings

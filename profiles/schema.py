@@ -15,7 +15,9 @@ from typing import Annotated, ClassVar, Literal
 from msgspec import Meta, field
 
 from profiles.bricks import BrickConfig, DifferentialGeometry, NxtMotorConfig
+from profiles.gamepad import GamepadConfig
 from profiles.localisation import LocalisationConfig, SimulatedScannerConfig
+from profiles.own_vehicle import OwnGeometry
 from profiles.parts import Name, NotNegative, Part, Positive
 from profiles.sensors import AngleCalibration, SensorDefects
 from profiles.steered import CarGeometry, SemitrailerGeometry
@@ -251,7 +253,7 @@ class OmniGeometry(Part, frozen=True, kw_only=True, tag_field="type", tag="omni"
 
 BodyGeometry = PairedSteerGeometry | OmniGeometry | CarGeometry | SemitrailerGeometry
 """Those whose mass the drives have to move."""
-Geometry = BodyGeometry | DifferentialGeometry
+Geometry = BodyGeometry | DifferentialGeometry | OwnGeometry
 
 
 class Limits(Part, frozen=True, kw_only=True):
@@ -366,6 +368,7 @@ class Profile(Part, frozen=True, kw_only=True):
     accelerometer: AccelerometerConfig | None = None
     vehicle: Geometry | None = None
     limits: Limits
+    gamepad: GamepadConfig = GamepadConfig()
     localisation: LocalisationConfig | None = None
     """None: the pose is that of the odometry alone."""
     traction: TractionConfig | None = None
