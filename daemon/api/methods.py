@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from daemon.api.encoder_methods import ENCODER_METHODS
+from daemon.api.gamepad_methods import GAMEPAD_METHODS
 from daemon.api.localisation_methods import LOCALISATION_METHODS
 from daemon.api.nxt_methods import NXT_METHODS
 from daemon.api.parameters import REQUIRED, Method, Param, Role
@@ -26,8 +27,8 @@ def _velocity(unit_doc: str, **more: Any) -> Param:
     return Param("velocity_rpm", "number", unit_doc, "rpm", minimum=-100_000.0, maximum=100_000.0, **more)
 
 
-def _angle(name: str, doc: str) -> Param:
-    return Param(name, "number", doc, "deg", minimum=-180.0, maximum=180.0)
+def _angle(name: str, doc: str, **more: Any) -> Param:
+    return Param(name, "number", doc, "deg", minimum=-180.0, maximum=180.0, **more)
 
 
 _TALK = (
@@ -250,9 +251,10 @@ _VEHICLE = (
         "drive.set",
         "Drive by direction and speed; the vehicle stops when the last value is too old. Answers at once.",
         (
-            _angle("direction_deg", "direction in the robot's frame"),
+            _angle("direction_deg", "direction in the robot's frame", default=0.0),
             _SPEED,
             Param("yaw_rate_deg_s", "number", "turn while driving, on vehicles that can", "deg/s", default=0.0),
+            _angle("steering_deg", "of the front wheels, where they steer (a rear pair: against it)", default=None),
             Param("valid_for_ms", "number", "age at which it is too old", "ms", 300.0, 20.0, 1000.0),
         ),
         "motion",
@@ -385,6 +387,7 @@ METHODS: dict[str, Method] = {
         *NXT_METHODS,
         *LOCALISATION_METHODS,
         *ENCODER_METHODS,
+        *GAMEPAD_METHODS,
         *SIMULATION_METHODS,
     )
 }

@@ -62,13 +62,18 @@ def steer_target(pair: int, heading_rad: float) -> PairedSteerTarget:
     return PairedSteerTarget(rear, front, 0.0, 0.0)
 
 
-def direction_target(direction_rad: float, speed_m_s: float) -> PairedSteerTarget:
-    """Drive on in a direction of the robot's frame: all wheels parallel, backward for directions behind."""
-    direction = math.remainder(direction_rad, math.tau)
-    if abs(direction) <= math.pi / 2:
-        return PairedSteerTarget(direction, direction, speed_m_s, None)
-    heading = direction - math.copysign(math.pi, direction)
-    return PairedSteerTarget(heading, heading, -speed_m_s, None)
+def direction_target(direction_rad: float, speed_m_s: float, steering_rad: float = 0.0) -> PairedSteerTarget:
+    """Drive on in a direction of the robot's frame, backward for directions behind: all wheels parallel, or on an arc.
+
+    Args:
+        direction_rad: where to.
+        speed_m_s: of the centre.
+        steering_rad: by which the front pair turns from there, and the rear pair the other way.
+    """
+    heading = math.remainder(direction_rad, math.tau)
+    if abs(heading) > math.pi / 2:
+        heading, speed_m_s = heading - math.copysign(math.pi, heading), -speed_m_s
+    return PairedSteerTarget(heading - steering_rad, heading + steering_rad, speed_m_s, None)
 
 
 def why_not_rotate() -> str:

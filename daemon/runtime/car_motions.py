@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
 from typing import Any, Protocol
 
 from canhelm.errors import DeviceFault
 from daemon.loops.ackermann_drive import CarLaw, CarRecord, CarTarget
 from daemon.loops.measurement import Command, Measurement
+from daemon.loops.path import wrap
 from daemon.loops.truck_odometry import TruckOdometry
 from daemon.runtime.motions import Motion
 from daemon.runtime.rest import AT_REST_M_S
-
-STREAM_END_S = 2.0
-"""A stream whose last value has been too old for this long is over."""
+from daemon.runtime.streams import Streamed
 
 
 class Senses(Protocol):
@@ -81,7 +79,7 @@ class CarMotion(Motion):
         return {
             "x_m": round(pose.x_m, 4),
             "y_m": round(pose.y_m, 4),
-            "heading_deg": round(math.degrees(pose.yaw_rad), 3),
+            "heading_deg": round(math.degrees(wrap(pose.yaw_rad)), 3),
             "heading_error_deg": round(math.degrees(self._last_error_rad), 3),
             "duration_s": round(now_s - self.begun_s, 3),
         }
@@ -104,13 +102,11 @@ class CarMotion(Motion):
 
 
 class CarStream(CarMotion):
-    """Driving by a stream of headings and speeds (``drive.set``); the car stops when the last one is too old.
+    """Driving by a stream of targets (``drive.set``); the car stops when the last one is too old.
 
     Args:
         valid_for_s: age at which the first value is too old.
     """
-
-    streaming = True
 
     def __init__(
         self,
@@ -123,20 +119,12 @@ class CarStream(CarMotion):
         valid_for_s: float,
     ) -> None:
         super().__init__(kind, drives, lease, senses, law, target)
-        self._age_s = 0.0
-        self.take(target, valid_for_s)
-
-    def take(self, target: CarTarget, valid_for_s: float) -> None:
-        """A new value."""
-        self._wanted = target
-        self._valid_for_s = valid_for_s
-        self._taken_s = asyncio.get_running_loop().time()
+        self.stream: Streamed[CarTarget] = Streamed(target, valid_for_s)
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """Follow the newest value, or come to rest where it is too old."""
-        self._age_s = measurement.time_s - self._taken_s
-        self.target = self._wanted if self._age_s <= self._valid_for_s else None
-        if not self.stop_reason and self._age_s > self._valid_for_s + STREAM_END_S:
+        self.target = self.stream.at(measurement.time_s)
+        if not self.stop_reason and self.stream.over:
             self.stop("no new value came")
         return super().step(measurement, dt_s)
 
@@ -145,4 +133,4 @@ class CarStream(CarMotion):
 
     def progress(self) -> dict[str, Any]:
         """As of any motion, and the age of the last value."""
-        return {**super().progress(), "value_age_ms": round(self._age_s * 1e3)}
+        return {**super().progress(), "value_age_ms": self.stream.age_ms}

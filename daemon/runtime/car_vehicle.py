@@ -22,6 +22,8 @@ from daemon.runtime.path_building import build_path
 from daemon.runtime.path_commands import PathRequest
 from daemon.runtime.path_motions import FollowedPath, PathMotion
 from daemon.runtime.steered_vehicle import SteeredVehicle
+from daemon.runtime.streams import valid_for_s
+from daemon.runtime.vehicle import Stick, both_ways
 from drivers.contract import Drive, SteeringEncoder
 from profiles.schema import Profile
 from profiles.steered import CarGeometry
@@ -69,7 +71,7 @@ class CarVehicle(SteeredVehicle):
         """The motion of ``drive.heading``, ``drive.turn`` or ``drive.set``."""
         law = self._law()
         if method == "drive.set":
-            return CarStream(method, self.names, lease, self, law, self._direction(params), _valid_for_s(params))
+            return CarStream(method, self.names, lease, self, law, self.set_point(params), valid_for_s(params))
         if method == "drive.turn":
             return CarMotion(method, self.names, lease, self, law, self._arc(params))
         target = CarTarget(self._speed(params), heading_rad=math.radians(params["heading_deg"]))
@@ -85,18 +87,6 @@ class CarVehicle(SteeredVehicle):
             self._period_s,
         )
 
-    def update(
-        self, method: str, params: dict[str, Any], lease: str | None, motions: list[Motion]
-    ) -> dict[str, Any] | None:
-        """A further value of a stream that this holder drives by."""
-        if method != "drive.set":
-            return None
-        for motion in motions:
-            if isinstance(motion, CarStream) and motion.lease == lease and not motion.stop_reason:
-                motion.take(self._direction(params), _valid_for_s(params))
-                return {"motion": motion.identity}
-        return None
-
     def _speed(self, params: dict[str, Any]) -> float:
         speed = float(params["speed_m_s"])
         if not math.isfinite(speed):
@@ -106,12 +96,23 @@ class CarVehicle(SteeredVehicle):
         _at_most("speed", speed, self._limits.speed_m_s, "m/s", "speed_m_s")
         return speed
 
-    def _direction(self, params: dict[str, Any]) -> CarTarget:
-        """A direction in the car's frame as the heading that lies there now."""
+    def set_point(self, params: dict[str, Any]) -> CarTarget:
+        """A steering angle, or a direction in the car's frame as the heading that lies there now."""
+        steering_deg, direction_deg = params.get("steering_deg"), float(params.get("direction_deg") or 0.0)
         if params.get("yaw_rate_deg_s"):
-            raise Refused("this car turns by its heading only", remedy="leave the yaw rate out, give a direction")
-        heading = self.odometry.pose.yaw_rad + math.radians(params["direction_deg"])
-        return CarTarget(self._speed(params), heading_rad=heading)
+            remedy = "leave the yaw rate out, give a direction or a steering angle"
+            raise Refused("this car turns by its steering only", remedy=remedy)
+        if steering_deg is None:
+            heading = self.odometry.pose.yaw_rad + math.radians(direction_deg)
+            return CarTarget(self._speed(params), heading_rad=heading)
+        if direction_deg:
+            raise UsageError("a direction and a steering angle contradict each other", remedy="give one of them")
+        _at_most("steering angle", abs(steering_deg), self._geometry.steering.limit_deg, "deg", "limit_deg")
+        return CarTarget(self._speed(params), steering_rad=math.radians(steering_deg))
+
+    def sticks(self) -> dict[str, Stick]:
+        """Speed, forward only, and steering angle."""
+        return {"speed": (0.0, self._limits.speed_m_s), "steering": both_ways(self.axle.limit_deg)}
 
     def _arc(self, params: dict[str, Any]) -> CarTarget:
         """An arc of fixed steering; only the front axle steers."""
@@ -192,10 +193,6 @@ def _refuse_reverse(request: PathRequest) -> None:
     for number, piece in enumerate(request.spec.pieces):
         if piece.drive == "backward":
             raise Refused(NO_REVERSE, object=f"pieces[{number}]", remedy=remedy)
-
-
-def _valid_for_s(params: dict[str, Any]) -> float:
-    return float(params["valid_for_ms"]) / 1e3
 
 
 def _at_most(what: str, value: float, limit: float, unit: str, name: str) -> None:

@@ -10,6 +10,7 @@ from daemon.runtime.brick_commands import BrickCommands
 from daemon.runtime.config_commands import ConfigCommands
 from daemon.runtime.encoder_commands import EncoderCommands
 from daemon.runtime.frame_commands import FrameCommands
+from daemon.runtime.gamepad_commands import GamepadCommands
 from daemon.runtime.handlers import Handler, Params, holder, run_motion
 from daemon.runtime.motions import Motion
 from daemon.runtime.motor_commands import MotorCommands
@@ -55,6 +56,7 @@ class Commands:
         driving: dict[str, Handler] = {method: self._vehicle_handler(method) for method in supervisor.vehicle.methods}
         if isinstance(supervisor.vehicle, PathVehicle):
             driving |= PathCommands(supervisor, supervisor.vehicle).handlers
+            **GamepadCommands(supervisor.vehicle).handlers,
         self._driving = frozenset(driving)
         self.handlers |= driving
 

@@ -7,15 +7,18 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from canhelm.errors import LimitExceeded, UsageError
+from canhelm.errors import LimitExceeded, Refused, UsageError
 from daemon.loops.differential import DifferentialDrive, Move, bend, line, parse_move, way_to
 from daemon.loops.differential_odometry import DifferentialOdometry
+from daemon.loops.differential_twist import DifferentialTwistLaw
 from daemon.loops.measurement import Measurement
 from daemon.loops.odometry import Pose
 from daemon.loops.pose_feedback import REPORT_GAINS, SLOW_CYCLE_GAINS, SeekSettings, Tolerance
 from daemon.runtime.differential_motions import BrickMoves, BrickWheels, PoseMotion
+from daemon.runtime.differential_stream import DifferentialStream, SetPoint
 from daemon.runtime.motions import Motion
-from daemon.runtime.vehicle import Vehicle
+from daemon.runtime.streams import valid_for_s
+from daemon.runtime.vehicle import Stick, Vehicle, both_ways
 from drivers.contract import Drive
 from drivers.nxt.motors import NxtDrive
 from profiles.bricks import DifferentialGeometry, NxtMotorConfig
@@ -36,7 +39,7 @@ class DifferentialVehicle(Vehicle):
         wheels: its drives, right and left.
     """
 
-    methods: tuple[str, ...] = ("drive.to",)
+    methods: tuple[str, ...] = ("drive.to", "drive.set")
 
     def __init__(self, profile: Profile, wheels: tuple[Drive, Drive]) -> None:
         super().__init__(profile, wheels)
@@ -51,7 +54,7 @@ class DifferentialVehicle(Vehicle):
         self._names = tuple(drive.name for drive in wheels)
         self._brick = _brick_wheels(wheels)
         if self._brick is not None:
-            self.methods = ("drive.to", "nxt.line", "nxt.bend", "nxt.goto", "nxt.moves")
+            self.methods = ("drive.to", "drive.set", "nxt.line", "nxt.bend", "nxt.goto", "nxt.moves")
 
     def measure(self, now_s: float) -> Measurement:
         """The newest readings; the pose by them."""
@@ -66,9 +69,12 @@ class DifferentialVehicle(Vehicle):
     # --- motions -----------------------------------------------------------------------------------------------
 
     def motion(self, method: str, params: dict[str, Any], lease: str | None) -> Motion:
-        """The motion of ``drive.to`` or an ``nxt.*`` method."""
+        """The motion of ``drive.to``, ``drive.set`` or an ``nxt.*`` method."""
         if method == "drive.to":
             return self._to(params, lease)
+        if method == "drive.set":
+            law, wanted = DifferentialTwistLaw(self._drive, self.profile.limits), self.set_point(params)
+            return DifferentialStream(method, self._names, lease, law, wanted, valid_for_s(params))
         if method == "nxt.goto" and params.get("feedback", True):
             goal = _pose(params, 0.0)
             here = self.odometry.pose
@@ -80,6 +86,21 @@ class DifferentialVehicle(Vehicle):
         if method != "nxt.goto" and params.get("feedback"):
             return self._seek(method, self._ends(moves), params, lease)
         return self._carry_out(method, moves, bool(params.get("compensate")), lease)
+
+    def set_point(self, params: dict[str, Any]) -> SetPoint:
+        """Speed and yaw rate that ``drive.set`` asks for. Raises LimitExceeded or Refused."""
+        if params.get("direction_deg") or params.get("steering_deg"):
+            raise Refused("a robot on two wheels only drives forward and backward, and turns", remedy="give a yaw rate")
+        wanted = SetPoint(float(params["speed_m_s"]), math.radians(params.get("yaw_rate_deg_s") or 0.0))
+        limits = self.profile.limits
+        _at_most("speed", abs(wanted.forward_m_s), limits.speed_m_s, "m/s", "speed_m_s")
+        _at_most("yaw rate", math.degrees(abs(wanted.yaw_rate_rad_s)), limits.yaw_rate_deg_s, "deg/s", "yaw_rate_deg_s")
+        return wanted
+
+    def sticks(self) -> dict[str, Stick]:
+        """Speed and yaw rate."""
+        limits = self.profile.limits
+        return {"speed": both_ways(limits.speed_m_s), "yaw_rate": both_ways(limits.yaw_rate_deg_s)}
 
     def _to(self, params: dict[str, Any], lease: str | None) -> Motion:
         if params.get("end_vx_m_s") or params.get("end_vy_m_s"):
@@ -93,10 +114,7 @@ class DifferentialVehicle(Vehicle):
         """Under feedback, no faster than asked for and allowed."""
         speed = params.get("speed_m_s")
         limit = self.profile.limits.speed_m_s
-        if speed is not None and not 0 < speed <= limit * (1 + _ROUNDING):
-            remedy = f"ask for at most {limit:g} m/s"
-            message = f"a speed of {speed:g} m/s is beyond the limit"
-            raise LimitExceeded(message, value=speed, limit=f"speed_m_s {limit:g}", remedy=remedy)
+        _at_most("speed", speed or 0.0, limit, "m/s", "speed_m_s")
         reach, longest_m = params.get("tolerance_m") or TOLERANCE_M, _longest_m([self.odometry.pose, *goals])
         settings = SeekSettings(
             Tolerance(reach, reach, math.radians(params.get("tolerance_deg") or TOLERANCE_DEG)),
@@ -176,6 +194,13 @@ class DifferentialVehicle(Vehicle):
                 "yaw_rate_deg_s": round(math.degrees((right - left) / 2 / self._drive.half_track_m), 2) + 0.0,
             },
         }
+
+
+def _at_most(what: str, value: float, limit: float, unit: str, name: str) -> None:
+    if value > limit * (1 + _ROUNDING):
+        remedy = f"ask for at most {limit:g} {unit}"
+        message = f"a {what} of {value:g} {unit} is beyond the limit"
+        raise LimitExceeded(message, value=value, limit=f"{name} {limit:g}", remedy=remedy)
 
 
 def _longest_m(poses: Sequence[Pose]) -> float:

@@ -17,7 +17,7 @@ async def run_motion(supervisor: Supervisor, motion: Motion, params: Params) -> 
     """Admit a motion; return its result when it is over, or its id at once where the caller does not wait."""
     motion.asked = params
     supervisor.admit(motion)
-    if motion.streaming or not params.get("wait", True):
+    if motion.stream is not None or not params.get("wait", True):
         return {"motion": motion.identity}
     return {"motion": motion.identity, **await motion.result()}
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from canhelm.errors import CanhelmError, Refused
 from daemon.loops.measurement import Command, Measurement
+from daemon.runtime.streams import Streamed
 from drivers.contract import Drive, DriveState
 
 
@@ -29,11 +30,11 @@ class Motion(ABC):
         closed: set when its drives are at rest and as it found them.
         asked: parameters that it was asked for with.
         record: terms of its law's last step; None before the first, and where it has no law.
+        stream: of a motion whose caller does not wait for it but goes on with new values, these.
     """
 
     record: object | None = None
-    streaming = False
-    """True for a motion whose caller does not wait for it but goes on with new values."""
+    stream: Streamed[Any] | None = None
 
     def __init__(self, kind: str, drives: tuple[str, ...], lease: str | None) -> None:
         self.identity = ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
 from typing import Any
 
@@ -11,11 +10,11 @@ from daemon.loops.measurement import Command, Measurement
 from daemon.loops.omni_drive import OmniLaw, OmniRecord
 from daemon.loops.omni_guide import Twist, TwistGuide
 from daemon.loops.omni_senses import OmniSenses
+from daemon.loops.path import wrap
 from daemon.loops.planner import PlanarState, Result
 from daemon.runtime.motions import Motion
+from daemon.runtime.streams import Streamed
 
-STREAM_END_S = 2.0
-"""A stream whose last value has been too old for this long is over."""
 FAILED = (Result.INVALID, Result.GOAL_TOO_FAST)
 STANDING: Twist = (0.0, 0.0, 0.0)
 
@@ -67,7 +66,7 @@ class OmniMotion(Motion):
         return {
             "x_m": round(pose.x_m, 4),
             "y_m": round(pose.y_m, 4),
-            "heading_deg": round(math.degrees(pose.yaw_rad), 3),
+            "heading_deg": round(math.degrees(wrap(pose.yaw_rad)), 3),
             "duration_s": round(measurement.time_s - self.begun_s, 3),
             "least_safety_factor": round(self.least_factor, 3),
             "slip_steps": self.slip_steps,
@@ -174,8 +173,6 @@ class TwistStream(OmniMotion):
         valid_for_s: age at which the first value is too old.
     """
 
-    streaming = True
-
     def __init__(
         self,
         kind: str,
@@ -188,20 +185,12 @@ class TwistStream(OmniMotion):
     ) -> None:
         super().__init__(kind, drives, lease, senses, law)
         self._guide = guide
-        self._age_s = 0.0
-        self.take(guide.twist, valid_for_s)
-
-    def take(self, twist: Twist, valid_for_s: float) -> None:
-        """A new value."""
-        self._wanted = twist
-        self._valid_for_s = valid_for_s
-        self._taken_s = asyncio.get_running_loop().time()
+        self.stream: Streamed[Twist] = Streamed(guide.twist, valid_for_s)
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """Follow the newest value, or come to rest where it is too old."""
-        self._age_s = measurement.time_s - self._taken_s
-        self._guide.twist = self._wanted if self._age_s <= self._valid_for_s else STANDING
-        if not self.stop_reason and self._age_s > self._valid_for_s + STREAM_END_S:
+        self._guide.twist = self.stream.at(measurement.time_s) or STANDING
+        if not self.stop_reason and self.stream.over:
             self.stop("no new value came")
         return super().step(measurement, dt_s)
 
@@ -212,4 +201,4 @@ class TwistStream(OmniMotion):
 
     def progress(self) -> dict[str, Any]:
         """As of any motion, and the age of the last value."""
-        return {**super().progress(), "value_age_ms": round(self._age_s * 1e3)}
+        return {**super().progress(), "value_age_ms": self.stream.age_ms}

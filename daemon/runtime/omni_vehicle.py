@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from canhelm.errors import LimitExceeded, UsageError
+from canhelm.errors import LimitExceeded, Refused, UsageError
 from daemon.loops.accelerometer import Mounting
 from daemon.loops.jerk_limit import JerkLimitedGuide
 from daemon.loops.measurement import Measurement
@@ -19,7 +19,8 @@ from daemon.loops.traction import Traction, TractionTuning
 from daemon.runtime.motions import Motion
 from daemon.runtime.omni_motions import GoalMotion, OmniMotion, TwistMotion, TwistStream
 from daemon.runtime.rest import AT_REST_M_S
-from daemon.runtime.vehicle import Vehicle
+from daemon.runtime.streams import valid_for_s
+from daemon.runtime.vehicle import Stick, Vehicle, both_ways
 from drivers.contract import Accelerometer as Sensor
 from drivers.contract import Drive, DriveState
 from profiles.schema import OmniGeometry, Profile
@@ -85,23 +86,23 @@ class OmniVehicle(Vehicle):
             return self._to(params, lease)
         if method == "drive.parallel":
             return self._parallel(params, lease)
-        twist = self._twist(method, params)
-        law, guide = self._on_twist(twist)
         if method == "drive.set":
-            return TwistStream(method, self._names, lease, self.senses, law, guide, float(params["valid_for_ms"]) / 1e3)
+            law, guide = self._on_twist(self.set_point(params))
+            return TwistStream(method, self._names, lease, self.senses, law, guide, valid_for_s(params))
+        law, guide = self._on_twist(self._twist(0.0, 0.0, params["rate_deg_s"]))
         return TwistMotion(method, self._names, lease, self.senses, law, guide, params.get("duration_s"))
 
-    def update(
-        self, method: str, params: dict[str, Any], lease: str | None, motions: list[Motion]
-    ) -> dict[str, Any] | None:
-        """A further value of a stream that this holder drives by."""
-        if method != "drive.set":
-            return None
-        for motion in motions:
-            if isinstance(motion, TwistStream) and motion.lease == lease and not motion.stop_reason:
-                motion.take(self._twist(method, params), float(params["valid_for_ms"]) / 1e3)
-                return {"motion": motion.identity}
-        return None
+    def set_point(self, params: dict[str, Any]) -> Twist:
+        """The twist that ``drive.set`` asks for. Raises LimitExceeded, Refused or UsageError."""
+        if params.get("steering_deg"):
+            raise Refused("omni-wheels do not steer", value=params["steering_deg"], remedy="give a direction")
+        direction_deg = float(params.get("direction_deg") or 0.0)
+        return self._twist(float(params["speed_m_s"]), direction_deg, params.get("yaw_rate_deg_s"))
+
+    def sticks(self) -> dict[str, Stick]:
+        """Speed in both directions, and yaw rate."""
+        speed, rate = both_ways(self.limits.speed), both_ways(self.profile.limits.yaw_rate_deg_s)
+        return {"speed": speed, "sideways": speed, "yaw_rate": rate}
 
     def to_goal(
         self,
@@ -157,11 +158,9 @@ class OmniVehicle(Vehicle):
         limits = replace(self.limits, speed=max(abs(speed), SLOWEST_M_S))
         return self.to_goal(goal, limits, lease, kind="drive.parallel")
 
-    def _twist(self, method: str, params: dict[str, Any]) -> Twist:
-        """The twist that a method asks for. Raises LimitExceeded or UsageError."""
-        rate = math.radians(params.get("yaw_rate_deg_s") or params.get("rate_deg_s") or 0.0)
-        speed = float(params["speed_m_s"]) if method == "drive.set" else 0.0
-        angle = math.radians(params["direction_deg"]) if method == "drive.set" else 0.0
+    def _twist(self, speed: float, direction_deg: float, rate_deg_s: float | None) -> Twist:
+        """A twist within the limits. Raises LimitExceeded or UsageError."""
+        rate, angle = math.radians(rate_deg_s or 0.0), math.radians(direction_deg)
         twist = speed * math.cos(angle), speed * math.sin(angle), rate
         if not all(map(math.isfinite, twist)):
             raise UsageError("a direction, speed or rate is not a finite number", remedy="give finite numbers")

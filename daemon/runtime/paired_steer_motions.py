@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
 from typing import Any
 
@@ -11,9 +10,7 @@ from daemon.loops.measurement import Command, Measurement
 from daemon.loops.paired_steer import PairedSteerLaw, PairedSteerRecord
 from daemon.loops.paired_steer_target import PairedSteerTarget
 from daemon.runtime.motions import Motion
-
-STREAM_END_S = 2.0
-"""A stream whose last value has been too old for this long, with the robot at rest, is over."""
+from daemon.runtime.streams import Streamed
 
 
 class PairedSteerMotion(Motion):
@@ -87,31 +84,23 @@ class PairedSteerMotion(Motion):
 
 
 class StreamMotion(PairedSteerMotion):
-    """Driving by a stream of values (``drive.set``); the robot stops when the last one is too old."""
+    """Driving by a stream of values (``drive.set``); the robot stops when the last one is too old.
 
-    streaming = True
+    Args:
+        valid_for_s: age at which the first value is too old.
+    """
 
     def __init__(
         self, kind: str, drives: tuple[str, ...], lease: str | None, law: PairedSteerLaw, target: PairedSteerTarget,
         valid_for_s: float,
     ) -> None:  # fmt: skip
         super().__init__(kind, drives, lease, law, target)
-        self._wanted = target
-        self._valid_for_s = valid_for_s
-        self._taken_s = asyncio.get_running_loop().time()
-        self._age_s = 0.0
-
-    def take(self, target: PairedSteerTarget, valid_for_s: float) -> None:
-        """A new value."""
-        self._wanted = self._wanted if target == self._wanted else target
-        self._valid_for_s = valid_for_s
-        self._taken_s = asyncio.get_running_loop().time()
+        self.stream: Streamed[PairedSteerTarget] = Streamed(target, valid_for_s)
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """Follow the newest value, or come to rest where it is too old."""
-        self._age_s = measurement.time_s - self._taken_s
-        self._target = self._wanted if self._age_s <= self._valid_for_s else None
-        if not self.stop_reason and self._target is None and self._age_s > self._valid_for_s + STREAM_END_S:
+        self._target = self.stream.at(measurement.time_s)
+        if not self.stop_reason and self.stream.over:
             self.stop("no new value came")
         if self.stop_reason or self._target is not None:
             return super().step(measurement, dt_s)
@@ -120,4 +109,4 @@ class StreamMotion(PairedSteerMotion):
 
     def progress(self) -> dict[str, Any]:
         """As of any motion, and the age of the last value."""
-        return {**super().progress(), "value_age_ms": round(self._age_s * 1e3)}
+        return {**super().progress(), "value_age_ms": self.stream.age_ms}

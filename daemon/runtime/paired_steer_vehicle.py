@@ -12,6 +12,7 @@ from daemon.loops.measurement import Measurement
 from daemon.loops.odometry import Odometry
 from daemon.loops.paired_steer import PairedSteerLaw
 from daemon.loops.paired_steer_target import (
+    SINGLE_CENTRE_LIMIT_RAD,
     PairedSteerTarget,
     check_target,
     direction_target,
@@ -27,7 +28,8 @@ from daemon.runtime.paired_steer_motions import PairedSteerMotion, StreamMotion
 from daemon.runtime.path_building import build_path
 from daemon.runtime.path_commands import PathRequest
 from daemon.runtime.path_in_pieces import PiecesPlan
-from daemon.runtime.vehicle import Vehicle
+from daemon.runtime.streams import valid_for_s
+from daemon.runtime.vehicle import Stick, Vehicle, both_ways
 from drivers.contract import Brake, Drive, SteeringEncoder
 from profiles.schema import PairedSteerGeometry, Profile
 
@@ -40,6 +42,7 @@ class PairedSteerVehicle(Vehicle):
 
     methods = ("steer", "drive.parallel", "drive.turn", "drive.rotate", "drive.set", "drive.path")
 
+    steers_at_rest = True
     def __init__(
         self,
         profile: Profile,
@@ -59,29 +62,35 @@ class PairedSteerVehicle(Vehicle):
         if method == "drive.rotate":
             raise Refused(why_not_rotate(), remedy="`canhelm drive turn` or `canhelm drive parallel`")
         target = self._target(method, params)
-        check_target(self.geometry, self.limits, target)
-        law = self.new_law()
         if method == "drive.set":
-            return StreamMotion(method, self.names, lease, law, target, _valid_for_s(params))
-        return PairedSteerMotion(method, self.names, lease, law, target)
+            set_point = self.set_point(params)
+            return StreamMotion(method, self.names, lease, self.new_law(), set_point, valid_for_s(params))
+        check_target(self.geometry, self.limits, target)
+        return PairedSteerMotion(method, self.names, lease, self.new_law(), target)
+
+    def set_point(self, params: dict[str, Any]) -> PairedSteerTarget:
+        """The target that ``drive.set`` asks for. Raises LimitExceeded, Refused or UsageError."""
+        if params.get("yaw_rate_deg_s"):
+            raise Refused(why_not_rotate(), remedy="leave the yaw rate out, give a steering angle")
+        direction_rad = math.radians(params.get("direction_deg") or 0.0)
+        steering_rad = math.radians(params.get("steering_deg") or 0.0)
+        target = direction_target(direction_rad, float(params["speed_m_s"]), steering_rad)
+        check_target(self.geometry, self.limits, target)
+        return target
+
+    def sticks(self) -> dict[str, Stick]:
+        """Speed, steering of both pairs against each other as far as one centre serves all wheels, and direction."""
+        heading_deg = self.limits.heading_deg
+        steering_deg = min(math.degrees(SINGLE_CENTRE_LIMIT_RAD), heading_deg)
+        return {
+            "speed": both_ways(self.limits.speed_m_s),
+            "steering": both_ways(steering_deg),
+            "direction": both_ways(heading_deg),
+        }
 
     def new_law(self) -> PairedSteerLaw:
         """A law of its own for one motion."""
         return PairedSteerLaw(self.geometry, self.limits, rim_drives(self.profile))
-
-    def update(
-        self, method: str, params: dict[str, Any], lease: str | None, motions: list[Motion]
-    ) -> dict[str, Any] | None:
-        """A further value of a stream that this holder drives by."""
-        if method != "drive.set":
-            return None
-        for motion in motions:
-            if isinstance(motion, StreamMotion) and motion.lease == lease and not motion.stop_reason:
-                target = self._target(method, params)
-                check_target(self.geometry, self.limits, target)
-                motion.take(target, _valid_for_s(params))
-                return {"motion": motion.identity}
-        return None
 
     def _target(self, method: str, params: dict[str, Any]) -> PairedSteerTarget:
         if method == "steer":
@@ -90,10 +99,6 @@ class PairedSteerVehicle(Vehicle):
                 raise UsageError(f"no wheel pair {pair!r}", remedy=f"one of {', '.join(PAIR_NAMES)}")
             return steer_target(PAIR_NAMES.index(pair), math.radians(params["angle_deg"]))
         speed = float(params["speed_m_s"])
-        if method == "drive.set":
-            if params.get("yaw_rate_deg_s"):
-                raise Refused(why_not_rotate(), remedy="leave the yaw rate out")
-            return direction_target(math.radians(params["direction_deg"]), speed)
         duration = float(params["duration_s"])
         if method == "drive.parallel":
             return parallel_target(math.radians(params["angle_deg"]), speed, duration)
@@ -161,7 +166,3 @@ class PairedSteerVehicle(Vehicle):
                 "yaw_deg": round(math.degrees(pose.yaw_rad), 3),
             },
         }
-
-
-def _valid_for_s(params: dict[str, Any]) -> float:
-    return float(params["valid_for_ms"]) / 1e3

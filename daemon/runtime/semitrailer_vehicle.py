@@ -1,4 +1,4 @@
-"""The truck with a semi-trailer: it follows paths, forwards and backwards."""
+"""The truck with a semi-trailer: it follows paths, forwards and backwards, or set-points of a person."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import Any, Final
 
-from canhelm.errors import LimitExceeded
+from canhelm.errors import LimitExceeded, Refused
 from daemon.loops.articulated import ArticulatedVehicle, Hitch
 from daemon.loops.measurement import Measurement
 from daemon.loops.odometry import Pose
@@ -14,12 +14,16 @@ from daemon.loops.path_driving import VehicleReading
 from daemon.loops.path_following import FollowingTuning
 from daemon.loops.path_speed import SpeedTuning
 from daemon.loops.truck_odometry import TruckOdometry
+from daemon.loops.truck_drive import TruckLaw, TruckTarget
 from daemon.runtime.motions import Motion
 from daemon.runtime.path_building import build_path
 from daemon.runtime.path_commands import PathRequest
 from daemon.runtime.path_motions import FollowedPath, PathMotion
 from daemon.runtime.steered_vehicle import SteeredVehicle
 from drivers.contract import Drive, SteeringEncoder
+from daemon.runtime.streams import valid_for_s
+from daemon.runtime.truck_stream import TruckStream
+from daemon.runtime.vehicle import Stick, both_ways
 from profiles.schema import Profile
 from profiles.steered import SemitrailerGeometry
 
@@ -50,7 +54,7 @@ class SemitrailerVehicle(SteeredVehicle):
         odometry: where the truck's driven axle is.
     """
 
-    methods = ("drive.path",)
+    methods = ("drive.path", "drive.set")
 
     def __init__(
         self, profile: Profile, drive: Drive, steering: Drive, encoders: tuple[SteeringEncoder, SteeringEncoder]
@@ -94,8 +98,30 @@ class SemitrailerVehicle(SteeredVehicle):
     # --- motions -----------------------------------------------------------------------------------------------
 
     def motion(self, method: str, params: dict[str, Any], lease: str | None) -> Motion:
-        """Never called: the only method is ``drive.path``, which plans first."""
-        raise AssertionError(method)
+        """The motion of ``drive.set``; ``drive.path`` plans first, and never comes here."""
+        law = TruckLaw(self.kinematics, self.axle, self.profile.limits)
+        return TruckStream(method, lease, self, law, self.set_point(params), valid_for_s(params))
+
+    def set_point(self, params: dict[str, Any]) -> TruckTarget:
+        """The target that ``drive.set`` asks for. Raises LimitExceeded or Refused."""
+        if params.get("yaw_rate_deg_s") or params.get("direction_deg"):
+            remedy = "leave direction and yaw rate out; a negative speed drives backward"
+            raise Refused("this truck turns by its steering angle only", remedy=remedy)
+        speed, steering_deg = float(params["speed_m_s"]), float(params.get("steering_deg") or 0.0)
+        self._speed(abs(speed))
+        if abs(steering_deg) > self.axle.limit_deg * (1 + _ROUNDING):
+            raise LimitExceeded(
+                f"a steering angle of {steering_deg:g} deg is beyond the limit",
+                value=steering_deg,
+                limit=f"limit_deg {self.axle.limit_deg:g}",
+                remedy=f"ask for {-self.axle.limit_deg:g} to {self.axle.limit_deg:g} deg",
+            )
+        return TruckTarget(speed, math.radians(steering_deg))
+
+    def sticks(self) -> dict[str, Stick]:
+        """Speed, backward no faster than it is steered well, and steering angle."""
+        fastest = self.profile.limits.speed_m_s
+        return {"speed": (-min(fastest, self._backward_m_s), fastest), "steering": both_ways(self.axle.limit_deg)}
 
     async def plan_path(self, request: PathRequest) -> FollowedPath:
         """See :class:`daemon.runtime.path_commands.PathVehicle`."""
@@ -124,16 +150,20 @@ class SemitrailerVehicle(SteeredVehicle):
                 limit=f"speed_m_s {limits.speed_m_s:g}",
                 remedy=f"ask for at most {limits.speed_m_s:g} m/s",
             )
-        backward = self.axle.rate_deg_s / STEERING_PER_WAY_DEG_M
-        return SpeedTuning(top, limits.acceleration_m_s2, limits.lateral_acceleration_m_s2, backward)
+        return SpeedTuning(top, limits.acceleration_m_s2, limits.lateral_acceleration_m_s2, self._backward_m_s)
+
+    @property
+    def _backward_m_s(self) -> float:
+        """Speed at which it is steered well backwards."""
+        return self.axle.rate_deg_s / STEERING_PER_WAY_DEG_M
 
     def wheel_speeds(self, speed_m_s: float, steering_rad: float) -> tuple[float]:
         """The driven axle has one motor."""
         return (speed_m_s,)
 
     def require_free(self, motion: Motion) -> None:
-        """A path needs both angles."""
-        if isinstance(motion, PathMotion):
+        """The laws need both angles."""
+        if isinstance(motion, PathMotion | TruckStream):
             for encoder in self.encoders:
                 encoder.require_ready()
 

@@ -10,6 +10,7 @@ from typing import Any
 from daemon.loops.limits import Gate
 from daemon.loops.measurement import Command, Measurement
 from daemon.runtime.motions import Motion
+from daemon.runtime.streams import valid_for_s
 from drivers.contract import Brake, BrakeState, Drive, SteeringEncoder
 from profiles.schema import Profile
 
@@ -26,6 +27,15 @@ class VehicleState(StrEnum):
     ESTOP = "estop"
 
 
+Stick = tuple[float, float]
+"""Least and largest value of a command that a stick gives, the latter at the end of its way."""
+
+
+def both_ways(largest: float) -> Stick:
+    """As far to the one side as to the other."""
+    return (-largest, largest)
+
+
 class Vehicle(ABC):
     """Drives, encoders and brakes in the order of the loops, and the motions that the vehicle has.
 
@@ -38,9 +48,11 @@ class Vehicle(ABC):
         methods: names of the ``drive.*`` methods and of others that this vehicle has.
         zero: the command that moves nothing and leaves the brakes as they are.
         aside: drives of the profile that no law moves, each for itself.
+        steers_at_rest: whether it has to stand to change its direction or its steering.
     """
 
     methods: tuple[str, ...] = ()
+    steers_at_rest = False
 
     def __init__(
         self,
@@ -88,8 +100,20 @@ class Vehicle(ABC):
     def update(
         self, method: str, params: dict[str, Any], lease: str | None, motions: list[Motion]
     ) -> dict[str, Any] | None:
-        """Take a new value into a running motion of the same holder; None where the method begins one."""
+        """Take a new value of ``drive.set`` into this holder's stream; None where the method begins a motion."""
+        for motion in motions if method == "drive.set" else ():
+            if motion.stream is not None and motion.lease == lease and not motion.stop_reason:
+                motion.stream.take(self.set_point(params), valid_for_s(params))
+                return {"motion": motion.identity}
         return None
+
+    def set_point(self, params: dict[str, Any]) -> object:
+        """What ``drive.set`` asks for, on vehicles that have it. Raises LimitExceeded, Refused or UsageError."""
+        raise AssertionError("drive.set")
+
+    def sticks(self) -> dict[str, Stick]:
+        """What a gamepad may give: speed, sideways [m/s], yaw_rate [deg/s], steering, direction [deg]."""
+        return {}
 
     def observe(self, measurement: Measurement) -> None:
         """Told of every cycle's measurement (odometry)."""

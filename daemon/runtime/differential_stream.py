@@ -1,0 +1,65 @@
+"""Driving a robot on two wheels by a stream of speeds and yaw rates."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from daemon.loops.differential_twist import DifferentialTwistLaw
+from daemon.loops.measurement import Command, Measurement
+from daemon.runtime.motions import Motion
+from daemon.runtime.rest import AT_REST_M_S
+from daemon.runtime.streams import Streamed
+
+
+class SetPoint(NamedTuple):
+    """What is wanted of the robot's body."""
+
+    forward_m_s: float
+    yaw_rate_rad_s: float
+
+
+STANDING = SetPoint(0.0, 0.0)
+
+
+class DifferentialStream(Motion):
+    """Driving by a stream of values (``drive.set``); the robot comes to rest when the last one is too old.
+
+    Args:
+        law: of its own.
+        wanted: the first value.
+        valid_for_s: age at which it is too old.
+    """
+
+    def __init__(
+        self,
+        kind: str,
+        drives: tuple[str, ...],
+        lease: str | None,
+        law: DifferentialTwistLaw,
+        wanted: SetPoint,
+        valid_for_s: float,
+    ) -> None:
+        super().__init__(kind, drives, lease)
+        self.stream: Streamed[SetPoint] = Streamed(wanted, valid_for_s)
+        self._law = law
+
+    def step(self, measurement: Measurement, dt_s: float) -> Command:
+        """Follow the newest value, or come to rest where it is too old or the motion was stopped."""
+        wanted = self.stream.at(measurement.time_s) or STANDING
+        if not self.stop_reason and self.stream.over:
+            self.stop("no new value came")
+        command = self._law.step(*(STANDING if self.stop_reason else wanted), dt_s)
+        rests = all(abs(speed) < AT_REST_M_S for speed in measurement.wheel_speed_m_s)
+        if self.stop_reason and rests and not any(command.wheel_speed_m_s):
+            self.finish({})
+        return command
+
+    def progress(self) -> dict[str, Any]:
+        """What is commanded, and the age of the last value."""
+        return {
+            "phase": "stopping" if self.stop_reason else "driving",
+            "speed_m_s": round(self._law.forward_m_s, 4),
+            "yaw_rate_deg_s": round(math.degrees(self._law.yaw_rate_rad_s), 2),
+            "value_age_ms": self.stream.age_ms,
+        }
