@@ -12,7 +12,7 @@ PACKAGED = $(shell find canhelm daemon drivers profiles packaging systemd -type 
 PACKAGING = DESTDIR='$(DESTDIR)' PREFIX='$(PREFIX)' PYTHON='$(SERVICE_PYTHON)' PIP_PYTHON='$(VENV)/bin/python'
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test lint vcan-test vcan-figures install uninstall deb client-wheel
+.PHONY: help venv demo docs test lint vcan-test vcan-figures install uninstall deb client-wheel
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST)
@@ -21,6 +21,11 @@ venv: $(VENV)/.stamp-demo ## canhelm in .venv
 
 demo: $(VENV)/.stamp-demo ## the simulated robot drives the published manoeuvres; pictures into demo-out/
 	$(VENV)/bin/canhelm demo --out $(OUT)
+
+docs: $(VENV)/.stamp-docs ## the documentation as a site of files, into site/; a warning is an error
+	$(VENV)/bin/python -m daemon.reference pages docs/reference
+	$(VENV)/bin/sphinx-build -W --keep-going -q docs site
+	@echo "open site/index.html"
 
 test: lint ## style, types, import rules, then all tests
 	$(VENV)/bin/pytest -n auto --dist loadfile -m 'not real_time and not vcan and not systemd'
@@ -70,4 +75,9 @@ $(VENV)/.stamp-demo: pyproject.toml | $(VENV)/bin/pip
 $(VENV)/.stamp-test: pyproject.toml | $(VENV)/bin/pip
 	@echo "installing canhelm and what its tests need into $(VENV)"
 	@$(PIP) --editable '.[plot,test]'
+	@touch $@
+
+$(VENV)/.stamp-docs: pyproject.toml | $(VENV)/bin/pip
+	@echo "installing canhelm and what its documentation needs into $(VENV)"
+	@$(PIP) --editable '.[docs]'
 	@touch $@
