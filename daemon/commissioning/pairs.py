@@ -87,7 +87,9 @@ def judge_encoders(pushes: Sequence[Push], encoders: Mapping[str, EncoderConfig]
                 told = {name: told[name] + push.turned_deg.get(name, 0.0) for name in told}
         name = max(told, key=lambda encoder: abs(told[encoder]))
         if abs(told[name]) < MOVED_DEG:
-            findings.unsolved.append(f"no encoder tells of the {pair} pair: check its coupling, or its brake")
+            findings.unsolved.append(
+                f"no encoder tells of the {pair} pair: not turned that far, or its coupling or cable"
+            )
             continue
         config = encoders[name]
         direction = config.direction if told[name] > 0.0 else -config.direction

@@ -16,7 +16,7 @@ from profiles.schema import DriveConfig
 JOG_M_S = 0.1
 JOG_S = 2.0
 LEAST_SHARE = 0.2
-"""Share of the commanded way below which a wheel has not turned."""
+"""Share of the commanded way, and of a turn by hand, below which a wheel has not turned."""
 TOLERANCE = 0.015
 """Of the counts of one turn by hand: five degrees. An encoder of 512 pulses differs from one of 500 by 0.024."""
 QUESTION = "which wheel turned, and which way? forward, backward or none; another wheel as `NAME forward`"
@@ -53,7 +53,7 @@ class Seen:
         wheel: the one that turned; empty where none did.
         forward: which way.
         moved: it counted at least a part of the commanded way.
-        turn_qc: counts of one turn forward by hand.
+        turn_qc: counts of one turn forward by hand; 0 where the wheel turned and did not count.
         pulses: of its encoder, as its label says; the profile's where the counts fit.
         radius_m: of the wheel.
     """
@@ -93,15 +93,26 @@ async def look_at_wheel(daemon: Daemon, person: Person, drive: str, wheels: Mapp
     wheel, forward = answer
     if not wheel or not moved:
         return Seen(drive, wheel, forward, moved)
-    before = await _position_qc(daemon, drive)
-    await person.ask(f"turn wheel {wheel} forward by hand, exactly one turn; then press Enter")
-    turn_qc = await _position_qc(daemon, drive) - before
+    turn_qc = await _turned_by_hand(daemon, person, drive, wheel, _expected_qc(wheels[wheel]))
     fitted, pulses = wheels[wheel], wheels[wheel].encoder_pulses_per_turn
     if turn_qc and not _fits(turn_qc, fitted, pulses):
         person.tell(f"{abs(turn_qc)} counts a turn of {wheel}, and the profile says {_expected_qc(fitted):.0f}")
         pulses = round(await number(person, "pulses a turn on the label of its encoder", pulses))
     radius_m = await number(person, f"diameter of wheel {wheel} in mm", 2e3 * fitted.wheel_radius_m) / 2e3
     return Seen(drive, wheel, forward, moved, turn_qc, pulses, radius_m)
+
+
+async def _turned_by_hand(daemon: Daemon, person: Person, drive: str, wheel: str, expected_qc: float) -> int:
+    """Counts of one turn; asked for again where there are hardly any, unless the person has surely turned the wheel."""
+    while True:
+        before = await _position_qc(daemon, drive)
+        await person.ask(f"turn wheel {wheel} forward by hand, exactly one turn; then press Enter")
+        turn_qc = await _position_qc(daemon, drive) - before
+        if abs(turn_qc) > LEAST_SHARE * expected_qc:
+            return turn_qc
+        person.tell(f"{abs(turn_qc)} counts of about {expected_qc:.0f}: not turned, or not connected with its motor")
+        if await agrees(person, f"has wheel {wheel} made a whole turn? A mark on its tyre tells"):
+            return 0
 
 
 async def _position_qc(daemon: Daemon, drive: str) -> int:
@@ -146,8 +157,10 @@ def _trouble(seen: Seen, commanded: DriveConfig) -> str:
         return "does not turn a wheel: check motor cable and brake"
     if not seen.wheel:
         return "does not turn a wheel, and its encoder counts: is the shaft loose, or the wheel?"
-    if not seen.moved or not seen.turn_qc:
+    if not seen.moved:
         return "turns, and its encoder counts nothing: check the encoder's cable"
+    if not seen.turn_qc:
+        return "counts with its motor, and not when its wheel is turned by hand: is the wheel loose on its shaft?"
     if _direction(seen) != (commanded.direction if seen.forward else -commanded.direction):
         return "was seen to turn one way and was counted the other way by hand: look again"
     return ""

@@ -18,8 +18,8 @@ class Workshop(Protocol):
     def lift(self, lifted: bool) -> None:
         """Put the robot onto blocks, or down again."""
 
-    def turn(self, name: str, angle_deg: float) -> float:
-        """Turn a wheel or push a pair by hand; by how much it gives way [degrees]."""
+    async def turn(self, name: str, angle_deg: float) -> float:
+        """Turn a wheel or push a pair by hand, to the end; by how much it has given way [degrees]."""
 
     def look(self) -> dict[str, Any]:
         """What can be seen of it."""
@@ -55,7 +55,7 @@ class WorkshopCommands:
         if name not in workshop.parts:
             have = ", ".join(dict.fromkeys(workshop.parts))
             raise UsageError(f"there is no {name} to turn", value=name, remedy=f"give one of {have}")
-        return {"name": name, "turned_deg": round(workshop.turn(name, float(params["angle_deg"])), 3)}
+        return {"name": name, "turned_deg": round(await workshop.turn(name, float(params["angle_deg"])), 1)}
 
     async def _look(self, params: Params, lease: str | None) -> dict[str, Any]:
         return self._simulated().look()

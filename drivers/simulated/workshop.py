@@ -6,8 +6,10 @@ import asyncio
 from math import degrees, radians
 from typing import Any
 
+from drivers.simulated.body import HAND_RAD_S
 from drivers.simulated.max2d import Max2dWorld
 from drivers.simulated.network import SimulatedNetwork
+from drivers.simulated.world import STEP_S
 from profiles.schema import PairedSteerGeometry, Profile
 
 
@@ -41,18 +43,27 @@ class Workshop:
         self._now()
         self._network.world.lifted = lifted
 
-    def turn(self, name: str, angle_deg: float) -> float:
+    async def turn(self, name: str, angle_deg: float) -> float:
         """Turn by hand a wheel, which rolls forward for a positive angle and takes its time, or push a wheel pair.
 
         Returns:
-            By how much it gives way [degrees]: nothing for a pair that is locked, or a wheel on the floor.
+            By how much it has given way [degrees]: nothing for a pair that is locked, or a wheel on the floor.
         """
         self._now()
+        return self._push(name, angle_deg) if name in self._pairs else await self._turn_wheel(name, radians(angle_deg))
+
+    async def _turn_wheel(self, name: str, angle_rad: float) -> float:
         world = self._network.world
-        if name not in self._pairs:
-            if world.lifted:
-                world.turn_by_hand(name, radians(angle_deg))
-            return angle_deg if world.lifted else 0.0
+        if not world.lifted:
+            return 0.0
+        before = world.wheel_rad(name)
+        world.turn_by_hand(name, angle_rad)
+        await asyncio.sleep(abs(angle_rad) / HAND_RAD_S + 2.0 * STEP_S)
+        self._now()
+        return degrees(world.wheel_rad(name) - before)
+
+    def _push(self, name: str, angle_deg: float) -> float:
+        world = self._network.world
         if self._network.brakes[self._pairs[name]].engaged:
             return 0.0
         assert isinstance(world, Max2dWorld)

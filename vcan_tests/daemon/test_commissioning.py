@@ -206,6 +206,35 @@ async def test_a_drive_that_faults_is_tried_again_or_left(again: str, unsolved: 
         assert len(findings.unsolved) == unsolved
 
 
+class Lazy(WorkshopPerson):
+    """Somebody who presses Enter without having turned the wheel, and says later what a look at it tells."""
+
+    lazy = 1
+    turned = "n"
+
+    async def ask(self, question: str) -> str:
+        if question.startswith("turn wheel") and self.lazy:
+            self.lazy -= 1
+            return ""
+        return self.turned if question.startswith("has wheel") else await super().ask(question)
+
+
+async def test_a_wheel_that_was_not_turned_by_hand_is_asked_for_again(tmp_path: Path) -> None:
+    async with workshop(robot_file(tmp_path)) as shop:
+        shop.person = Lazy(shop.call)
+        findings = await shop.commission("rear_left")
+        assert "0 counts of about 56000: not turned, or not connected with its motor" in shop.person.heard
+        assert (findings.wrong, findings.unsolved) == ([], [])
+
+
+async def test_a_wheel_that_turns_without_its_motor_is_loose(tmp_path: Path) -> None:
+    async with workshop(robot_file(tmp_path)) as shop:
+        shop.person = Lazy(shop.call)
+        shop.person.turned = "y"
+        findings = await shop.commission("rear_left")
+        assert "is the wheel loose on its shaft?" in findings.unsolved[0]
+
+
 async def test_who_says_no_gets_nothing_changed(tmp_path: Path) -> None:
     async with workshop(robot_file(tmp_path)) as shop:
 

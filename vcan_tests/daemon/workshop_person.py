@@ -78,12 +78,4 @@ class WorkshopPerson:
     async def _turn_once(self, wheel: str) -> str:
         self._wheel = wheel
         await self._call("simulation.hand", name=wheel, angle_deg=360.0)
-        await self._rests()
         return ""
-
-    async def _rests(self) -> None:
-        """Wait until the hand has done its turn: as long as something moves."""
-        before: dict[str, float] = {}
-        while (now := (await self._call("simulation.look"))["wheel_deg"]) != before:
-            before = now
-            await asyncio.sleep(MOMENT_S)

@@ -35,11 +35,10 @@ async def test_wheels_in_the_air_turn_and_the_robot_stays() -> None:
 
 async def test_a_wheel_is_turned_by_hand_only_in_the_air() -> None:
     shop = workshop()
-    assert shop.turn("rear_left", 90.0) == 0.0
+    assert await shop.turn("rear_left", 90.0) == 0.0
     shop.lift(True)
     before = shop.look()["wheel_deg"]["rear_left"]
-    assert shop.turn("rear_left", 90.0) == 90.0
-    await asyncio.sleep(1.0)
+    assert await shop.turn("rear_left", 90.0) == pytest.approx(90.0, abs=0.1)
     assert shop.look()["wheel_deg"]["rear_left"] - before == pytest.approx(90.0, abs=0.1)
 
 
