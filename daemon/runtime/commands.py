@@ -52,11 +52,11 @@ class Commands:
             **ConfigCommands(supervisor).handlers,
             **SimulationCommands(supervisor, network).handlers,
             **WorkshopCommands(workshop).handlers,
+            **GamepadCommands(supervisor.vehicle).handlers,
         }
         driving: dict[str, Handler] = {method: self._vehicle_handler(method) for method in supervisor.vehicle.methods}
         if isinstance(supervisor.vehicle, PathVehicle):
             driving |= PathCommands(supervisor, supervisor.vehicle).handlers
-            **GamepadCommands(supervisor.vehicle).handlers,
         self._driving = frozenset(driving)
         self.handlers |= driving
 

@@ -41,8 +41,8 @@ class PairedSteerVehicle(Vehicle):
     """A robot with paired steering; order of wheels, encoders and brakes as in ``daemon.loops.geometry``."""
 
     methods = ("steer", "drive.parallel", "drive.turn", "drive.rotate", "drive.set", "drive.path")
-
     steers_at_rest = True
+
     def __init__(
         self,
         profile: Profile,
@@ -61,10 +61,10 @@ class PairedSteerVehicle(Vehicle):
         """The motion of ``steer``, ``drive.parallel``, ``drive.turn`` or ``drive.set``; ``drive.rotate`` is refused."""
         if method == "drive.rotate":
             raise Refused(why_not_rotate(), remedy="`canhelm drive turn` or `canhelm drive parallel`")
-        target = self._target(method, params)
         if method == "drive.set":
             set_point = self.set_point(params)
             return StreamMotion(method, self.names, lease, self.new_law(), set_point, valid_for_s(params))
+        target = self._target(method, params)
         check_target(self.geometry, self.limits, target)
         return PairedSteerMotion(method, self.names, lease, self.new_law(), target)
 

@@ -13,17 +13,17 @@ from daemon.loops.odometry import Pose
 from daemon.loops.path_driving import VehicleReading
 from daemon.loops.path_following import FollowingTuning
 from daemon.loops.path_speed import SpeedTuning
-from daemon.loops.truck_odometry import TruckOdometry
 from daemon.loops.truck_drive import TruckLaw, TruckTarget
+from daemon.loops.truck_odometry import TruckOdometry
 from daemon.runtime.motions import Motion
 from daemon.runtime.path_building import build_path
 from daemon.runtime.path_commands import PathRequest
 from daemon.runtime.path_motions import FollowedPath, PathMotion
 from daemon.runtime.steered_vehicle import SteeredVehicle
-from drivers.contract import Drive, SteeringEncoder
 from daemon.runtime.streams import valid_for_s
 from daemon.runtime.truck_stream import TruckStream
 from daemon.runtime.vehicle import Stick, both_ways
+from drivers.contract import Drive, SteeringEncoder
 from profiles.schema import Profile
 from profiles.steered import SemitrailerGeometry
 
