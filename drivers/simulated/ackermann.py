@@ -22,17 +22,13 @@ from __future__ import annotations
 from math import atan2, cos, sin
 from random import Random
 
-from canhelm.errors import ConfigError
-from drivers.simulated.body import GRAVITY_M_S2, BodyWorld
+from drivers.simulated.body import GRAVITY_M_S2, LOAD_SHIFT_S, BodyWorld, parts_of
 from drivers.simulated.motor import WheelDrive
 from drivers.simulated.steered_axle import SimulatedSteering
-from drivers.simulated.tyre import DAMPING_S, Contact, require_soft
+from drivers.simulated.tyre import Contact, require_soft
 from drivers.simulated.world import STEP_S
 from profiles.schema import Profile, SimulationConfig
 from profiles.steered import CarGeometry
-
-LOAD_SHIFT_S = 0.05
-"""Time constant with which wheel loads follow the body's acceleration (assumed)."""
 
 
 class FreeWheel:
@@ -118,7 +114,7 @@ class AckermannWorld(BodyWorld):
         start: tuple[float, float, float] = (0.0, 0.0, 0.0),
         step_s: float = STEP_S,
     ) -> None:
-        vehicle, simulation = _parts_of(profile)
+        vehicle, simulation = parts_of(profile, CarGeometry, "a car", "ackermann")
         _check_stiffness(profile, vehicle, simulation, step_s)
         random, axle = Random(seed), vehicle.steering
         drives = {name: WheelDrive(profile.drives[name], simulation, random.random()) for name in vehicle.wheels}
@@ -180,10 +176,6 @@ class AckermannWorld(BodyWorld):
             raise KeyError(pair)
         return self.steering.angle_rad
 
-    def set_brake(self, name: str, engaged: bool) -> None:
-        """Raises KeyError: the car has no brakes."""
-        raise KeyError(name)
-
     def _step(self) -> None:
         """Integrate one step: forces by the old velocities, then velocities, then positions."""
         dt = self._step_s
@@ -219,26 +211,14 @@ class AckermannWorld(BodyWorld):
             wheel.stop()
 
 
-def _parts_of(profile: Profile) -> tuple[CarGeometry, SimulationConfig]:
-    """The sections of the profile that the physics needs."""
-    if not isinstance(profile.vehicle, CarGeometry) or profile.simulation is None:
-        raise ConfigError(
-            f"profile {profile.name} cannot be simulated as a car: it needs such a vehicle, and the section simulation",
-            object="simulation" if profile.simulation is None else "vehicle",
-            remedy="add them, or start from a profile that has them: canhelm profile new NAME --extends ackermann",
-        )
-    return profile.vehicle, profile.simulation
-
-
 def _check_stiffness(profile: Profile, vehicle: CarGeometry, simulation: SimulationConfig, step_s: float) -> None:
-    """Refuse tyres that the step cannot follow: ``k M h (h + 2 tau) < 4`` as for a mass 1/M on a damped spring k.
+    """Refuse tyres that the step cannot follow.
 
-    M is that of a free wheel, which is the lightest, and of the body, at which four springs pull.
+    What they pull at is a free wheel, which is the lightest, and the body, at which four springs pull.
     """
     radius = profile.drives[vehicle.wheels[0]].wheel_radius_m
     ahead = max(vehicle.mass_offset_m, vehicle.wheelbase_m - vehicle.mass_offset_m)
     body = 4.0 * (1.0 / vehicle.mass_kg + ahead * ahead / vehicle.yaw_inertia_kg_m2)
     mobility = radius * radius / simulation.wheel_inertia_kg_m2 + body
     tyre, load = simulation.tyre, vehicle.mass_kg * GRAVITY_M_S2 / 2.0
-    least = tyre.cornering_stiffness_per_rad * load * mobility * step_s * (step_s + 2.0 * DAMPING_S) / 3.0
-    require_soft(tyre, least, step_s)
+    require_soft(tyre, tyre.cornering_stiffness_per_rad * load, mobility, step_s)

@@ -5,9 +5,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from math import cos, sin
+from typing import Protocol, TypeVar
 
+from canhelm.errors import ConfigError
 from drivers.simulated.motor import WheelDrive
 from drivers.simulated.world import Axis
+from profiles.schema import BodyGeometry, Profile, SimulationConfig
 
 GRAVITY_M_S2 = 9.81
 REST_SPEED = 1e-5
@@ -16,6 +19,39 @@ HAND_RAD_S = 4.0
 """Speed at which a hand turns a wheel (assumed)."""
 REST_STEPS = 50
 """Steps at rest, half a swing of the body on its tyres, after which the world stands still."""
+LOAD_SHIFT_S = 0.05
+"""Time constant with which wheel loads follow the body's acceleration (assumed)."""
+
+G = TypeVar("G", bound=BodyGeometry)
+
+
+def parts_of(profile: Profile, kind: type[G], what: str, example: str) -> tuple[G, SimulationConfig]:
+    """The sections of a profile that the physics needs.
+
+    Args:
+        profile: the robot.
+        kind: of its vehicle.
+        what: it is, in words.
+        example: a profile that has both sections.
+
+    Raises:
+        ConfigError: the vehicle is another one, or a section is missing.
+    """
+    if not isinstance(profile.vehicle, kind) or profile.simulation is None:
+        raise ConfigError(
+            f"profile {profile.name} cannot be simulated as {what}: it needs such a vehicle and simulation data",
+            object="simulation" if profile.simulation is None else "vehicle",
+            remedy=f"add them, or start from a profile that has them: canhelm profile new NAME --extends {example}",
+        )
+    return profile.vehicle, profile.simulation
+
+
+class Braked(Protocol):
+    """What a brake holds."""
+
+    def set_brake(self, engaged: bool) -> None:
+        """Engage or release it."""
+        ...
 
 
 class BodyWorld(ABC):
@@ -37,6 +73,7 @@ class BodyWorld(ABC):
     ) -> None:
         self.axes: dict[str, Axis] = {name: drive.axis for name, drive in drives.items()}
         self._drives = tuple(drives.values())
+        self._braked: Mapping[str, Braked] = {}
         self.lifted = False
         self.hands: dict[WheelDrive, float] = {}
         self._mass_kg = mass_kg
@@ -84,12 +121,19 @@ class BodyWorld(ABC):
         """True heading of a wheel pair by its encoder's name."""
 
     @abstractmethod
-    def set_brake(self, name: str, engaged: bool) -> None:
-        """Engage or release a brake from the last advanced time on."""
-
-    @abstractmethod
     def _step(self) -> None:
         """Integrate one step."""
+
+    def _fit_brakes(self, profile: Profile, braked: Mapping[str, Braked]) -> None:
+        """Brakes by their names in the profile, each as it is without current."""
+        self._braked = braked
+        for name, part in braked.items():
+            part.set_brake(engaged=profile.brakes[name].energise_to_release)
+
+    def set_brake(self, name: str, engaged: bool) -> None:
+        """Engage or release a brake from the last advanced time on. Raises KeyError: there is none of this name."""
+        self._braked[name].set_brake(engaged)
+        self._quiet_steps = 0
 
     def advance(self, now_s: float) -> None:
         """Integrate up to ``now_s``; the first call sets the origin of time."""

@@ -18,16 +18,13 @@ from math import hypot
 from random import Random
 
 from canhelm.errors import ConfigError
-from drivers.simulated.body import GRAVITY_M_S2, BodyWorld
+from drivers.simulated.body import GRAVITY_M_S2, LOAD_SHIFT_S, BodyWorld, parts_of
 from drivers.simulated.floor import Floor
 from drivers.simulated.motor import WheelDrive
-from drivers.simulated.tyre import DAMPING_S, Contact, require_soft
+from drivers.simulated.tyre import Contact, require_soft
 from drivers.simulated.wheel_pair import Pair, Wheel
 from drivers.simulated.world import STEP_S
 from profiles.schema import PairedSteerGeometry, Profile, SimulationConfig
-
-LOAD_SHIFT_S = 0.05
-"""Time constant with which wheel loads follow the body's acceleration (assumed)."""
 
 
 class Max2dWorld(BodyWorld):
@@ -51,7 +48,7 @@ class Max2dWorld(BodyWorld):
         start: tuple[float, float, float] = (0.0, 0.0, 0.0),
         step_s: float = STEP_S,
     ) -> None:
-        vehicle, simulation = _parts_of(profile)
+        vehicle, simulation = parts_of(profile, PairedSteerGeometry, "a vehicle with paired steering", "max2d")
         _check_stiffness(profile, vehicle, simulation, step_s)
         _check_tipping(vehicle, simulation)
         random = Random(seed)
@@ -69,12 +66,11 @@ class Max2dWorld(BodyWorld):
         self.pairs = dict(zip(vehicle.encoders, (self._rear, self._front), strict=True))
         """Wheel pairs by the names of their encoders."""
         steering = dict(zip(vehicle.brakes, (self._rear, self._front), strict=True))
-        self._braked: dict[str, Pair | WheelDrive] = {
+        braked: dict[str, Pair | WheelDrive] = {
             name: steering[name] if brake.kind == "steering" else self.wheels[brake.drive].drive
             for name, brake in profile.brakes.items()
         }
-        for name, brake in profile.brakes.items():
-            self._braked[name].set_brake(engaged=brake.energise_to_release)
+        self._fit_brakes(profile, braked)
         self._floor = Floor(simulation.tyre.friction, simulation.floor) if simulation.floor else None
         self._yaw_inertia = vehicle.yaw_inertia_kg_m2
         self._mean_load_n = load
@@ -111,11 +107,6 @@ class Max2dWorld(BodyWorld):
     def set_heading(self, pair: str, heading_rad: float) -> None:
         """Put a wheel pair at a heading, as by hand before the start."""
         self.pairs[pair].place(heading_rad)
-
-    def set_brake(self, name: str, engaged: bool) -> None:
-        """Engage or release a brake from the last advanced time on."""
-        self._braked[name].set_brake(engaged)
-        self._quiet_steps = 0
 
     def _step(self) -> None:
         """Integrate one step: forces by the old velocities, then velocities, then positions."""
@@ -173,17 +164,6 @@ class Max2dWorld(BodyWorld):
         self._rear.rate_rad_s = self._front.rate_rad_s = 0.0
 
 
-def _parts_of(profile: Profile) -> tuple[PairedSteerGeometry, SimulationConfig]:
-    """The sections of the profile that the physics needs."""
-    if not isinstance(profile.vehicle, PairedSteerGeometry) or profile.simulation is None:
-        raise ConfigError(
-            f"profile {profile.name} cannot be simulated as a vehicle: it needs the sections vehicle and simulation",
-            object="simulation" if profile.simulation is None else "vehicle",
-            remedy="add them, or start from a profile that has them: canhelm profile new NAME --extends max2d",
-        )
-    return profile.vehicle, profile.simulation
-
-
 def _rim_mobility(profile: Profile, vehicle: PairedSteerGeometry, simulation: SimulationConfig) -> float:
     """Acceleration at a rim per force [1/kg]: of the lightest wheel, of a pair about its axes, of the body."""
     wheels = (profile.drives[name] for name in vehicle.wheels)
@@ -199,17 +179,9 @@ def _rim_mobility(profile: Profile, vehicle: PairedSteerGeometry, simulation: Si
 def _check_stiffness(
     profile: Profile, vehicle: PairedSteerGeometry, simulation: SimulationConfig, step_s: float
 ) -> None:
-    """Refuse tyres that the step cannot follow.
-
-    A mass 1/M on a spring k with the damping tau k, integrated as here in steps h, is stable for
-    ``k M h (h + 2 tau) < 4``; 3 leaves room for the shift of load.
-    """
-    mobility = _rim_mobility(profile, vehicle, simulation)
-    stiffest = 3.0 / (mobility * step_s * (step_s + 2.0 * DAMPING_S))
-    tyre = simulation.tyre
-    load = vehicle.mass_kg * GRAVITY_M_S2 / 4.0
-    least = tyre.cornering_stiffness_per_rad * load / stiffest
-    require_soft(tyre, least, step_s)
+    """Refuse tyres that the step cannot follow, at a quarter of the weight."""
+    tyre, load = simulation.tyre, vehicle.mass_kg * GRAVITY_M_S2 / 4.0
+    require_soft(tyre, tyre.cornering_stiffness_per_rad * load, _rim_mobility(profile, vehicle, simulation), step_s)
 
 
 def _check_tipping(vehicle: PairedSteerGeometry, simulation: SimulationConfig) -> None:

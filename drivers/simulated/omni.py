@@ -16,16 +16,13 @@ from random import Random
 
 from canhelm.errors import ConfigError
 from drivers.simulated.accelerometer import SimulatedAccelerometer
-from drivers.simulated.body import GRAVITY_M_S2, BodyWorld
+from drivers.simulated.body import GRAVITY_M_S2, LOAD_SHIFT_S, BodyWorld, parts_of
 from drivers.simulated.floor import Floor
 from drivers.simulated.motor import WheelDrive
 from drivers.simulated.roller_wheel import RollerWheel
-from drivers.simulated.tyre import DAMPING_S, require_soft
+from drivers.simulated.tyre import require_soft
 from drivers.simulated.world import STEP_S
 from profiles.schema import OmniGeometry, Profile, SimulationConfig
-
-LOAD_SHIFT_S = 0.05
-"""Time constant with which wheel loads follow the body's acceleration (assumed)."""
 
 LEAST_SPREAD_M4 = 1e-9
 """Smallest determinant of the contact points' sums that counts as no line."""
@@ -56,7 +53,7 @@ class OmniWorld(BodyWorld):
         start: tuple[float, float, float] = (0.0, 0.0, 0.0),
         step_s: float = STEP_S,
     ) -> None:
-        vehicle, simulation = _parts_of(profile)
+        vehicle, simulation = parts_of(profile, OmniGeometry, "a robot on omni-wheels", "turtle")
         random = Random(seed)
         self.wheels = {
             name: RollerWheel(geometry, simulation, WheelDrive(profile.drives[name], simulation, random.random()))
@@ -70,9 +67,7 @@ class OmniWorld(BodyWorld):
         self.accelerometer = SimulatedAccelerometer(config, noise, random.getrandbits(32)) if config else None
         self._rolling = tuple(self.wheels.values())
         self._yaw_inertia = vehicle.yaw_inertia_kg_m2
-        self._braked = {name: drives[brake.drive] for name, brake in profile.brakes.items()}
-        for name, brake in profile.brakes.items():
-            self._braked[name].set_brake(engaged=brake.energise_to_release)
+        self._fit_brakes(profile, {name: drives[brake.drive] for name, brake in profile.brakes.items()})
         self._spread_load(vehicle)
 
     def _spread_load(self, vehicle: OmniGeometry) -> None:
@@ -107,11 +102,6 @@ class OmniWorld(BodyWorld):
     def heading_rad(self, pair: str) -> float:
         """Raises KeyError: there are no wheel pairs."""
         raise KeyError(pair)
-
-    def set_brake(self, name: str, engaged: bool) -> None:
-        """Engage or release a holding brake from the last advanced time on."""
-        self._braked[name].set_brake(engaged)
-        self._quiet_steps = 0
 
     def _step(self) -> None:
         """Integrate one step: forces by the old velocities, then velocities, then positions."""
@@ -172,22 +162,10 @@ def _smallest(rows: list[tuple[float, float, float]]) -> list[tuple[float, float
     ]
 
 
-def _parts_of(profile: Profile) -> tuple[OmniGeometry, SimulationConfig]:
-    """The sections of the profile that the physics needs."""
-    if not isinstance(profile.vehicle, OmniGeometry) or profile.simulation is None:
-        raise ConfigError(
-            f"profile {profile.name} cannot be simulated as a robot on omni-wheels: it needs such a vehicle, and "
-            "the section simulation",
-            object="simulation" if profile.simulation is None else "vehicle",
-            remedy="add them, or start from a profile that has them: canhelm profile new NAME --extends turtle",
-        )
-    return profile.vehicle, profile.simulation
-
-
 def _check_stiffness(profile: Profile, vehicle: OmniGeometry, simulation: SimulationConfig, step_s: float) -> None:
-    """Refuse tyres that the step cannot follow: ``k M h (h + 2 tau) < 4`` as for a mass 1/M on a damped spring k.
+    """Refuse tyres that the step cannot follow.
 
-    M is that of one wheel and of the body at the wheel's rim, where all wheels' springs may pull at the body together.
+    What they pull at is one wheel, and the body at the wheel's rim, where all wheels' springs may pull together.
     """
     wheels, lever_m = len(vehicle.wheels), max(abs(wheel.lever_m) for wheel in vehicle.wheels.values())
     body = wheels * (1.0 / vehicle.mass_kg + lever_m * lever_m / vehicle.yaw_inertia_kg_m2)
@@ -197,5 +175,4 @@ def _check_stiffness(profile: Profile, vehicle: OmniGeometry, simulation: Simula
         for drive in profile.drives.values()
     )
     tyre, load = simulation.tyre, vehicle.mass_kg * GRAVITY_M_S2 / wheels
-    least = tyre.slip_stiffness * load * (rim + body) * step_s * (step_s + 2.0 * DAMPING_S) / 3.0
-    require_soft(tyre, least, step_s)
+    require_soft(tyre, tyre.slip_stiffness * load, rim + body, step_s)

@@ -21,11 +21,10 @@ from collections.abc import Mapping
 from math import copysign, cos, radians, sin
 from random import Random
 
-from canhelm.errors import ConfigError
-from drivers.simulated.body import GRAVITY_M_S2, BodyWorld
+from drivers.simulated.body import GRAVITY_M_S2, BodyWorld, parts_of
 from drivers.simulated.motor import WheelDrive
 from drivers.simulated.steered_axle import SimulatedSteering
-from drivers.simulated.tyre import DAMPING_S, Contact, require_soft
+from drivers.simulated.tyre import Contact, require_soft
 from drivers.simulated.world import STEP_S
 from profiles.schema import Profile, SimulationConfig
 from profiles.steered import SemitrailerGeometry
@@ -95,7 +94,7 @@ class SemitrailerWorld(BodyWorld):
     """
 
     def __init__(self, profile: Profile, seed: int = 0, step_s: float = STEP_S) -> None:
-        vehicle, simulation = _parts_of(profile)
+        vehicle, simulation = parts_of(profile, SemitrailerGeometry, "a semi-trailer", "semitrailer")
         _check_stiffness(vehicle, simulation, step_s)
         random, axle, trailer = Random(seed), vehicle.steering, vehicle.trailer
         drive = WheelDrive(profile.drives[vehicle.wheels[0]], simulation, random.random())
@@ -153,10 +152,6 @@ class SemitrailerWorld(BodyWorld):
     def heading_rad(self, pair: str) -> float:
         """True steering or bending angle, by its encoder's name."""
         return self.steering.angle_rad if self._angles[pair] == "steering" else self._bent_rad
-
-    def set_brake(self, name: str, engaged: bool) -> None:
-        """Raises KeyError: the vehicle has no brakes."""
-        raise KeyError(name)
 
     def place(self, rear_axle: Pose, bending_rad: float = 0.0, steering_rad: float = 0.0) -> None:
         """Put the vehicle, at rest, where it shall begin, as by hand.
@@ -229,22 +224,11 @@ class SemitrailerWorld(BodyWorld):
         self._trailer_rate = 0.0
 
 
-def _parts_of(profile: Profile) -> tuple[SemitrailerGeometry, SimulationConfig]:
-    """The sections of the profile that the physics needs."""
-    if not isinstance(profile.vehicle, SemitrailerGeometry) or profile.simulation is None:
-        raise ConfigError(
-            f"profile {profile.name} cannot be simulated as a semi-trailer: it needs such a vehicle, and the section "
-            "simulation",
-            object="simulation" if profile.simulation is None else "vehicle",
-            remedy="add them, or start from a profile that has them: canhelm profile new NAME --extends semitrailer",
-        )
-    return profile.vehicle, profile.simulation
-
-
 def _check_stiffness(vehicle: SemitrailerGeometry, simulation: SimulationConfig, step_s: float) -> None:
-    """Refuse tyres that the step cannot follow: ``k M h (h + 2 tau) < 4`` as for a mass 1/M on a damped spring k.
+    """Refuse tyres that the step cannot follow.
 
-    M is that of the truck's and the trailer's body at the axle where it is largest; each may carry all the weight.
+    What they pull at is the truck's or the trailer's body, at the axle where it gives way most; each may carry all the
+    weight.
     """
     trailer = vehicle.trailer
     ahead = max(vehicle.wheelbase_m - vehicle.mass_offset_m, vehicle.mass_offset_m)
@@ -253,6 +237,4 @@ def _check_stiffness(vehicle: SemitrailerGeometry, simulation: SimulationConfig,
     mobility = max(truck, 1.0 / trailer.mass_kg + behind * behind / trailer.yaw_inertia_kg_m2)
     load = (vehicle.mass_kg + trailer.mass_kg) * GRAVITY_M_S2 / 2.0
     tyre = simulation.tyre
-    stiffness = max(tyre.cornering_stiffness_per_rad, tyre.slip_stiffness)
-    least = stiffness * load * mobility * step_s * (step_s + 2.0 * DAMPING_S) / 3.0
-    require_soft(tyre, least, step_s)
+    require_soft(tyre, max(tyre.cornering_stiffness_per_rad, tyre.slip_stiffness) * load, mobility, step_s)

@@ -38,9 +38,8 @@ class StandWorld(BodyWorld):
             if profile.simulation is not None
         }
         super().__init__(drives, 1.0, (0.0, 0.0, 0.0), STEP_S)
-        self._braked = {name: drives[brake.drive] for name, brake in profile.brakes.items() if brake.drive in drives}
-        for name, brake in self._braked.items():
-            brake.set_brake(engaged=profile.brakes[name].energise_to_release)
+        brakes = profile.brakes.items()
+        self._fit_brakes(profile, {name: drives[brake.drive] for name, brake in brakes if brake.drive in drives})
 
     @property
     def slip_ratio(self) -> tuple[float, ...]:
@@ -55,11 +54,6 @@ class StandWorld(BodyWorld):
     def heading_rad(self, pair: str) -> float:
         """A stand steers nothing."""
         return 0.0
-
-    def set_brake(self, name: str, engaged: bool) -> None:
-        """Engage or release a holding brake from the last advanced time on."""
-        self._braked[name].set_brake(engaged)
-        self._quiet_steps = 0
 
     def _step(self) -> None:
         for drive in self._drives:

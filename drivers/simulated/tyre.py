@@ -34,17 +34,22 @@ SLOWEST_REFERENCE_M_S = 0.05
 """Speed below which slip is reported relative to this speed, since the ratio means nothing near standstill."""
 
 
-def require_soft(tyre: Tyre, least_m: float, step_s: float) -> None:
+def require_soft(tyre: Tyre, stiffness_n: float, mobility_per_kg: float, step_s: float) -> None:
     """Refuse tyres that an integration step cannot follow.
+
+    A mass 1/M on a spring k with the damping tau k, integrated as here in steps h, is stable for
+    ``k M h (h + 2 tau) < 4``; 3 leaves room for the shift of load.
 
     Args:
         tyre: of the profile.
-        least_m: relaxation length that they need.
+        stiffness_n: force per slip, at the wheel's load; over the relaxation length it is the spring.
+        mobility_per_kg: acceleration per force of what the tyre pulls at.
         step_s: the step.
 
     Raises:
-        ConfigError: theirs is shorter.
+        ConfigError: their relaxation length is too short.
     """
+    least_m = stiffness_n * mobility_per_kg * step_s * (step_s + 2.0 * DAMPING_S) / 3.0
     if tyre.relaxation_length_m < least_m:
         raise ConfigError(
             f"the simulated tyres are too stiff for steps of {1000.0 * step_s:g} ms",
