@@ -6,11 +6,13 @@ from canhelm.errors import ConfigError
 from daemon.runtime.car_vehicle import CarVehicle
 from daemon.runtime.differential_vehicle import DifferentialVehicle
 from daemon.runtime.omni_vehicle import OmniVehicle
+from daemon.runtime.own_vehicle import OwnKindVehicle
 from daemon.runtime.paired_steer_vehicle import PairedSteerVehicle
 from daemon.runtime.semitrailer_vehicle import SemitrailerVehicle
 from daemon.runtime.vehicle import BareDrives, Vehicle
 from drivers.devices import Devices
 from profiles.bricks import DifferentialGeometry
+from profiles.own_vehicle import OwnGeometry
 from profiles.schema import OmniGeometry, PairedSteerGeometry, Profile
 from profiles.steered import CarGeometry, SemitrailerGeometry
 
@@ -46,4 +48,11 @@ def _vehicle_of(profile: Profile, devices: Devices) -> Vehicle:
     if isinstance(geometry, DifferentialGeometry):
         right, left = (devices.drives[name] for name in geometry.wheels)
         return DifferentialVehicle(profile, (right, left))
+    if isinstance(geometry, OwnGeometry):
+        return OwnKindVehicle(
+            profile,
+            tuple(devices.drives[name] for name in geometry.wheels),
+            tuple(devices.encoders[name] for name in geometry.encoders),
+            tuple(devices.brakes[name] for name in geometry.brakes),
+        )
     raise ConfigError(f"profile {profile.name}: no loops for a vehicle of type {type(geometry).__name__}")
