@@ -19,6 +19,7 @@ install_program() { # an environment of its own, without pip, as if it had been 
 	"$PYTHON" -m venv --clear --without-pip "$root$prefix"
 	"$PIP_PYTHON" -m pip --python "$root$prefix/bin/python3" install --quiet --disable-pip-version-check --no-compile '.[slcan]'
 	find "$root$prefix/lib" -name direct_url.json -delete
+	find "$root$prefix/lib" -depth -path '*/site-packages/*/tests' -exec rm -rf {} + # those of libraries
 	grep -lIr "$root$prefix" "$root$prefix/bin" "$root$prefix/pyvenv.cfg" | xargs -r sed -i "s|$root$prefix|$prefix|g"
 	"$root$prefix/bin/python3" -m compileall -q -s "$root" -p / "$root$prefix/lib"
 	mkdir -p "$root/usr/bin"

@@ -1,4 +1,4 @@
-"""The rules of the house name modules that exist: a rule about a misspelt module would hold for ever."""
+"""The rules of the house hold: they name modules that exist, and each test is where it is looked for."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
+from vcan_tests.kernel.suite import MARKS
 
 ROOT = Path(__file__).resolve().parent.parent
 OURS = ("canhelm", "daemon", "drivers", "profiles")
@@ -30,3 +32,10 @@ def named_modules() -> list[str]:
 @pytest.mark.parametrize("name", named_modules())
 def test_a_module_that_a_rule_names_exists(name: str) -> None:
     assert find_spec(name) is not None
+
+
+@pytest.mark.parametrize("mark", MARKS)
+def test_the_tests_of_a_guest_are_in_the_folder_that_is_searched_for_them(mark: str) -> None:
+    tests = ROOT / "vcan_tests"
+    marked = {path for path in tests.rglob("test_*.py") if f"pytest.mark.{mark}" in path.read_text(encoding="utf-8")}
+    assert marked - {Path(__file__).resolve()} <= set((tests / mark).iterdir())

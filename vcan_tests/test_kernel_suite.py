@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
+import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -9,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from vcan_tests.kernel.guest import NO_STATUS, TIMED_OUT
-from vcan_tests.kernel.processes import run_to_end
+from vcan_tests.kernel.processes import run, run_to_end
 from vcan_tests.kernel.suite import Part, part_of
 
 ONE_OF_EACH = """
@@ -69,9 +72,35 @@ def test_the_last_line_names_the_kernel_and_the_numbers() -> None:
     assert str(part) == "vcan tests on the running kernel 6.1.0: 3 passed, 1 FAILED, none skipped (exit status 1)"
 
 
-def test_a_process_that_outlives_its_parent_is_ended_with_it() -> None:
-    assert run_to_end(["sh", "-c", "sleep 600 &"], timeout_s=60) == 0  # it holds the output open as long as it lives
+@pytest.mark.real_time
+async def test_a_process_that_outlives_its_parent_is_ended_with_it() -> None:
+    command = ["sh", "-c", "sleep 600 &"]  # it holds the output open as long as it lives
+    assert await run_to_end(command, timeout_s=60) == 0
 
 
-def test_a_command_is_ended_when_its_time_is_over() -> None:
-    assert run_to_end(["sleep", "600"], timeout_s=0.1) is None
+@pytest.mark.real_time
+async def test_a_command_is_ended_when_its_time_is_over() -> None:
+    assert await run_to_end(["sleep", "600"], timeout_s=0.1) is None
+
+
+@pytest.mark.real_time
+async def test_what_two_commands_say_at_the_same_time_is_kept_apart(tmp_path: Path) -> None:
+    with (tmp_path / "one").open("w+b") as one, (tmp_path / "other").open("w+b") as other:
+        said = {"first": one, "second": other}
+        await asyncio.gather(*(run_to_end(["echo", word], 60, output=output) for word, output in said.items()))
+    assert [(tmp_path / name).read_text() for name in ("one", "other")] == ["first\n", "second\n"]
+
+
+def test_a_signal_ends_it_with_its_processes_and_tells_by_the_exit_status() -> None:
+    pipe, end = os.pipe()
+
+    async def work() -> None:
+        asyncio.get_running_loop().call_later(0.1, os.kill, os.getpid(), signal.SIGTERM)
+        await run_to_end(["sleep", "600"], timeout_s=60, descriptors=[end])
+
+    with pytest.raises(SystemExit) as ended:
+        run(work())
+    os.close(end)
+    assert ended.value.code == 128 + signal.SIGTERM
+    with os.fdopen(pipe) as held_by_nobody:
+        assert held_by_nobody.read() == ""

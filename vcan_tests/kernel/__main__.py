@@ -7,6 +7,7 @@ import sys
 
 from vcan_tests.kernel.errors import MissingTool
 from vcan_tests.kernel.guest import NO_STATUS, TIMED_OUT, exchange_folder, run_in_guest
+from vcan_tests.kernel.processes import run
 from vcan_tests.kernel.tools import require_tools
 
 
@@ -24,7 +25,7 @@ def main() -> int:
     try:
         require_tools()
         with exchange_folder() as exchange:
-            outcome = run_in_guest(
+            work = run_in_guest(
                 asked.command,
                 exchange,
                 systemd=asked.systemd,
@@ -32,6 +33,7 @@ def main() -> int:
                 show_kernel=asked.show_kernel,
                 environment=dict(asked.env),
             )
+            outcome = run(work)
     except MissingTool as error:
         print(f"no guest: {error}", file=sys.stderr)
         return NO_STATUS

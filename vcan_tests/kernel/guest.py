@@ -17,6 +17,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 from vcan_tests.kernel.fetch import Kernel, cache, fetch_kernel
 from vcan_tests.kernel.processes import run_to_end
@@ -37,7 +38,7 @@ class Outcome:
     kernel: str
 
 
-def run_in_guest(
+async def run_in_guest(
     command: Sequence[str],
     exchange: Path,
     *,
@@ -45,8 +46,9 @@ def run_in_guest(
     timeout_s: float | None = None,
     show_kernel: bool = False,
     environment: Mapping[str, str] | None = None,
+    output: IO[bytes] | None = None,
 ) -> Outcome:
-    """Boots a guest, runs the command in the present folder, and halts the guest; its output goes to our stdout.
+    """Boots a guest, runs the command in the present folder, and halts the guest.
 
     Args:
         command: Program and arguments, as the guest finds them: by path, or in the system's folders.
@@ -55,6 +57,7 @@ def run_in_guest(
         timeout_s: Wall time until the guest is ended, in seconds.
         show_kernel: Whether the kernel's own messages are shown: for a guest that dies.
         environment: Variables for the command beside the few that are passed on.
+        output: Where its output goes; None: to our stdout.
 
     Raises:
         MissingTool: no user-mode kernel can be had here.
@@ -63,7 +66,8 @@ def run_in_guest(
     _furnish(exchange, kernel, "run_systemd.sh" if systemd else "run_plain.sh")
     _write_script(exchange / "command", command, environment or {})
     with _own_cpu() as cpu, _serial_cable() as ends:
-        ended = run_to_end(_command_line(kernel, exchange, cpu, ends, show_kernel), timeout_s, ends)
+        command_line = _command_line(kernel, exchange, cpu, ends, show_kernel)
+        ended = await run_to_end(command_line, timeout_s, ends, output)
     release = exchange / "kernel"
     status = TIMED_OUT if ended is None else _status(exchange)
     return Outcome(status, release.read_text().strip() if release.exists() else "that did not start")

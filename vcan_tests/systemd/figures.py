@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vcan_tests.kernel.guest import exchange_folder, is_guest, run_in_guest
+from vcan_tests.kernel.processes import run
 from vcan_tests.kernel.suite import build_package
 from vcan_tests.kernel.tools import require_tools
 from vcan_tests.systemd.bench import PATIENT, PROFILE, SERVICE, Journal, Robot, Witness, told, until
@@ -93,9 +94,14 @@ def main() -> int:
         asyncio.run(_measure())
         return 0
     require_tools()
-    build_package()
+    return run(_measure_in_guest())
+
+
+async def _measure_in_guest() -> int:
+    await build_package()
     with exchange_folder() as exchange:
-        return run_in_guest([sys.executable, "-m", MODULE], exchange, systemd=True, timeout_s=LONGEST_S).status
+        command = [sys.executable, "-m", MODULE]
+        return (await run_in_guest(command, exchange, systemd=True, timeout_s=LONGEST_S)).status
 
 
 async def _measure() -> None:

@@ -23,6 +23,7 @@ from tempfile import TemporaryDirectory, mkdtemp
 from daemon.demo import FIGURES
 from vcan_tests.kernel import running
 from vcan_tests.kernel.guest import exchange_folder, run_in_guest
+from vcan_tests.kernel.processes import run
 from vcan_tests.kernel.tools import require_tools
 from vcan_tests.vcan.bench import COMMAND, Bench, Daemon, Simulator, bench, patient, words_of, write_profile
 from vcan_tests.vcan.pauses import PauseWatch, watched_for_pauses
@@ -94,7 +95,7 @@ def main() -> int:
     if not running.has_vcan():
         require_tools()
         with exchange_folder() as exchange:
-            return run_in_guest([sys.executable, "-m", MODULE], exchange, timeout_s=LONGEST_S).status
+            return run(run_in_guest([sys.executable, "-m", MODULE], exchange, timeout_s=LONGEST_S)).status
     with running.buses_up(), TemporaryDirectory() as folder:
         show(f"kernel {os.uname().release}, {os.cpu_count()} processor(s)")
         with watched_for_pauses(Path(folder) / "pauses") as pauses:
