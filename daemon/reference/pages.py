@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from daemon.reference.api import api
 from daemon.reference.commands import commands
 from daemon.reference.errors import errors
 from daemon.reference.objects import objects
 from daemon.reference.profile import profile
 
 PAGES: dict[str, Callable[[], str]] = {
+    "api.md": api,
     "commands.md": commands,
     "errors.md": errors,
     "objects.md": objects,
