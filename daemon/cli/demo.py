@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
-import signal
-from collections.abc import Callable, Coroutine
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,6 +11,7 @@ from cyclopts import Parameter
 from canhelm.errors import UsageError
 from daemon.cli.demo_ackermann import demo_ackermann
 from daemon.cli.demo_max2d_path import demo_max2d_path
+from daemon.cli.demo_run import DemoRun, can_draw
 from daemon.cli.demo_semitrailer import demo_semitrailer
 from daemon.cli.demo_view import DemoView
 from daemon.cli.output import Json, say, show, words
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
 
     from daemon.demo import FigureResult
     from daemon.demo_nxt import NxtResult
-    from daemon.demo_turtle import TurtleFigure, TurtleResult
+    from daemon.demo_turtle import TurtleResult
     from profiles.schema import Profile
 
 NXT = "nxt"
@@ -62,14 +61,11 @@ def demo(
     from daemon.runtime.clock import run_patient, run_virtual
     from profiles.loader import load
 
+    run = DemoRun(seed, out, json, run_virtual if virtual_time else run_patient)
     if figure == NXT:
-        return _nxt(load(profile or NXT).profile, seed, out, json, run_virtual if virtual_time else run_patient)
-    runner = run_virtual if virtual_time else run_patient
+        return _nxt(load(profile or NXT).profile, run)
     if figure in (*SEMITRAILER, *ACKERMANN, PATH_IN_PIECES):
-        if out is not None:
-            _make_folder(out)
-        _end_by_signals()
-        return _on_paths(figure, profile, seed, out, json, runner)
+        return _on_paths(figure, profile, run)
     figures = tuple(entry for entry in FIGURES if figure in (None, entry.identity))
     turtle = tuple(entry for entry in demo_turtle.FIGURES if figure in (demo_turtle.GROUP, entry.identity))
     if not figures and not turtle:
@@ -83,94 +79,66 @@ def demo(
         raise UsageError(
             f"the demo simulates its network, on {bus!r} it cannot", remedy="--bus simulated or --bus rs232"
         )
-    if out is not None:
-        _make_folder(out)
-    _end_by_signals()
+    run.begin()
     if turtle:
-        return _turtle(turtle, robot, seed, out, json, runner)
+        return run.drive(
+            [partial(demo_turtle.drive, robot, entry, seed, out, say) for entry in turtle], _turtle_table, _draw_turtle
+        )
     with DemoView(every=100 if virtual_time else 10) as view:
 
         async def drive() -> list[FigureResult]:
             return await Demo(robot, seed, out, view.tell, view.watch, bus).run(figures)
 
-        results = runner(drive())
-    show([result.numbers for result in results], lambda _: _table(results), json)
-    if out is not None:
-        _draw(results, robot.vehicle, out)
+        results: list[FigureResult] = run.runner(drive())
+    run.show(results, _table, partial(_draw, robot))
     return 0
 
 
-def _on_paths(
-    figure: str, profile: str | None, seed: int, out: Path | None, json: bool | None, runner: Callable[..., Any]
-) -> int:
+def _on_paths(figure: str, profile: str | None, run: DemoRun) -> int:
     """A figure of a vehicle that steers while it rolls, or of the MAX2D on a path."""
     from profiles.loader import load
 
+    run.begin()
     if figure == PATH_IN_PIECES:
-        return demo_max2d_path(load(profile or "max2d").profile, seed, out, json, runner, _can_draw)
+        return demo_max2d_path(load(profile or "max2d").profile, run)
     group, drive = (SEMITRAILER, demo_semitrailer) if figure in SEMITRAILER else (ACKERMANN, demo_ackermann)
-    return drive(figure, load(profile or group[0]).profile, seed, out, json, runner, _can_draw)
+    return drive(figure, load(profile or group[0]).profile, run)
 
 
-def _turtle(
-    figures: tuple[TurtleFigure, ...],
-    robot: Profile,
-    seed: int,
-    out: Path | None,
-    json: bool | None,
-    runner: Callable[[Coroutine[Any, Any, list[TurtleResult]]], list[TurtleResult]],
-) -> int:
-    from daemon import demo_turtle
-
-    async def drive() -> list[TurtleResult]:
-        return [await demo_turtle.drive(robot, figure, seed, out, say) for figure in figures]
-
-    results = runner(drive())
-    show([result.numbers for result in results], lambda _: _turtle_table(results), json)
-    if out is not None and _can_draw():
-        from daemon.demo_turtle_pictures import draw
-
-        for result in results:
-            say(f"picture {draw(result, out)}")
-    return 0
-
-
-def _turtle_table(results: list[TurtleResult]) -> Table:
+def _turtle_table(rows: list[dict[str, Any]]) -> Table:
     from rich.table import Table
 
     table = Table("figure", "move", "quantity", "published", "commanded", "achieved", title="Turtle, simulated")
-    for result in results:
-        published, commanded, achieved = (result.numbers[part] for part in ("published", "commanded", "achieved"))
-        for key, value in achieved.items():
-            cells = [published.get(key), commanded.get(key), value]
+    for row in rows:
+        for key, value in row["achieved"].items():
+            cells = [row["published"].get(key), row["commanded"].get(key), value]
             shown = ["-" if cell is None else f"{cell:g}" for cell in cells]
-            table.add_row(result.figure.identity, result.figure.words, key, *shown)
+            table.add_row(row["figure"], row["move"], key, *shown)
         table.add_section()
     return table
 
 
-def _nxt(
-    robot: Profile,
-    seed: int,
-    out: Path | None,
-    json: bool | None,
-    runner: Callable[[Coroutine[Any, Any, list[NxtResult]]], list[NxtResult]],
-) -> int:
+def _draw_turtle(result: TurtleResult, folder: Path) -> Path:
+    from daemon.demo_turtle_pictures import draw
+
+    return draw(result, folder)
+
+
+def _nxt(robot: Profile, run: DemoRun) -> int:
     from daemon import demo_nxt
 
-    if out is not None:
-        _make_folder(out)
-    _end_by_signals()
+    run.begin()
 
     async def drive() -> list[NxtResult]:
-        return [await demo_nxt.drive(robot, figure, seed, say) for figure in demo_nxt.FIGURES]
+        return [await demo_nxt.drive(robot, figure, run.seed, say) for figure in demo_nxt.FIGURES]
 
-    results, calls = runner(drive()), demo_nxt.report_calls()
-    show([*(result.numbers for result in results), *(call.numbers for call in calls)], _nxt_table, json)
-    if out is not None and _can_draw():
+    results: list[NxtResult] = run.runner(drive())
+    calls = demo_nxt.report_calls()
+    show([*(result.numbers for result in results), *(call.numbers for call in calls)], _nxt_table, run.json)
+    if run.out is not None and can_draw():
         from daemon.demo_nxt_pictures import draw_calls, draw_moves
 
-        for path in (draw_moves(results, out), *draw_calls(calls, out)):
+        for path in (draw_moves(results, run.out), *draw_calls(calls, run.out)):
             say(f"picture {path}")
     return 0
 
@@ -191,41 +159,17 @@ def _nxt_table(rows: list[dict[str, Any]]) -> Table:
     return table
 
 
-def _end_by_signals() -> None:
-    """The loop ends the demo in order on SIGINT, which shells ignore for background jobs; other signals become one."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, _as_ctrl_c)
-
-
-def _as_ctrl_c(number: int, _: object) -> None:
-    signal.raise_signal(signal.SIGINT)
-
-
-def _make_folder(out: Path) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UsageError(
-            f"--out {out} is no folder and cannot be made one: {error.strerror}",
-            value=str(out),
-            remedy="name a folder that this user may write to",
-        ) from error
-
-
-def _table(results: list[FigureResult]) -> Table:
+def _table(rows: list[dict[str, Any]]) -> Table:
     from rich.table import Table
 
     table = Table("figure", "move", "quantity", "published", "commanded", "achieved", title="MAX2D, simulated")
-    for result in results:
-        numbers = result.numbers
-        keys = ("radius_m",) if result.figure.move == "turn" else ("end_x_m", "end_y_m")
+    for row in rows:
+        keys = ("radius_m",) if row["move"] == "turn" else ("end_x_m", "end_y_m")
         for key in keys:
-            cells = [numbers[column].get(key) for column in ("published", "commanded", "achieved")]
+            cells = [row[column].get(key) for column in ("published", "commanded", "achieved")]
             shown = ["-" if cell is None else f"{cell:.3f}" for cell in cells]
-            table.add_row(result.figure.identity, result.figure.move, key, *shown)
-        achieved = numbers["achieved"]
+            table.add_row(row["figure"], row["move"], key, *shown)
+        achieved = row["achieved"]
         table.add_row("", "", "steering error, deg", "-", "0", f"{achieved['steering_error_deg']:.2f}")
         table.add_row("", "", "slip ratio | slip angle, deg", "-", "-",
                       f"{achieved['max_slip_ratio']:.3f} | {achieved['max_slip_angle_deg']:.2f}")  # fmt: skip
@@ -233,17 +177,9 @@ def _table(results: list[FigureResult]) -> Table:
     return table
 
 
-def _can_draw() -> bool:
-    if importlib.util.find_spec("matplotlib") is None:
-        say("no pictures: matplotlib is missing - pip install 'canhelm[plot]'")
-        return False
-    return True
-
-
-def _draw(results: list[FigureResult], geometry: Any, out: Path) -> None:
-    if not _can_draw():
-        return
+def _draw(robot: Profile, result: FigureResult, folder: Path) -> Path:
     from daemon.demo_pictures import draw
+    from profiles.schema import PairedSteerGeometry
 
-    for result in results:
-        say(f"picture {draw(result, geometry, out)}")
+    assert isinstance(robot.vehicle, PairedSteerGeometry)
+    return draw(result, robot.vehicle, folder)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from daemon.cli.output import say, show, words
+from daemon.cli.demo_run import DemoRun
+from daemon.cli.output import say, words
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -14,44 +15,19 @@ if TYPE_CHECKING:
     from daemon.demo_ackermann import CarResult
     from profiles.schema import Profile
 
-Runner = Callable[[Coroutine[Any, Any, Any]], Any]
 
-
-def demo_ackermann(
-    figure: str,
-    robot: Profile,
-    seed: int,
-    out: Path | None,
-    json: bool | None,
-    runner: Runner,
-    can_draw: Callable[[], bool],
-) -> int:
+def demo_ackermann(figure: str, robot: Profile, run: DemoRun) -> int:
     """Drive one step of the car or all of them; the exit code.
 
     Args:
         figure: a name, or that of the group.
         robot: profile of the car.
-        seed: of everything random.
-        out: folder for pictures and candump logs, or None.
-        json: how to print.
-        runner: of the event loop, in real or virtual time.
-        can_draw: whether pictures can be drawn.
+        run: how.
     """
     from daemon import demo_ackermann as demo
 
-    chosen = [entry for entry in demo.FIGURES if figure in (demo.GROUP, entry.identity)]
-
-    async def drive() -> list[CarResult]:
-        return [await demo.run(robot, entry, seed, out, say) for entry in chosen]
-
-    results: list[CarResult] = runner(drive())
-    show([result.numbers for result in results], _table, json)
-    if out is not None and can_draw():
-        from daemon.demo_ackermann_pictures import draw
-
-        for result in results:
-            say(f"picture {draw(result, out)}")
-    return 0
+    steps = [step for step in demo.FIGURES if figure in (demo.GROUP, step.identity)]
+    return run.drive([partial(demo.run, robot, step, run.seed, run.out, say) for step in steps], _table, _draw)
 
 
 def _table(rows: list[dict[str, Any]]) -> Table:
@@ -63,3 +39,9 @@ def _table(rows: list[dict[str, Any]]) -> Table:
             table.add_row(row["figure"], key, words(row["computed"][key]), words(value))
         table.add_section()
     return table
+
+
+def _draw(result: CarResult, folder: Path) -> Path:
+    from daemon.demo_ackermann_pictures import draw
+
+    return draw(result, folder)

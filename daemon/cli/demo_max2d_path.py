@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from daemon.cli.output import say, show, words
+from daemon.cli.demo_run import DemoRun
+from daemon.cli.output import say, words
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -14,31 +15,17 @@ if TYPE_CHECKING:
     from daemon.demo_max2d_path import PathResult
     from profiles.schema import Profile
 
-Runner = Callable[[Coroutine[Any, Any, Any]], Any]
 
-
-def demo_max2d_path(
-    robot: Profile, seed: int, out: Path | None, json: bool | None, runner: Runner, can_draw: Callable[[], bool]
-) -> int:
+def demo_max2d_path(robot: Profile, run: DemoRun) -> int:
     """Drive the path; the exit code.
 
     Args:
         robot: profile with paired steering.
-        seed: of everything random.
-        out: folder for the picture and the candump log, or None.
-        json: how to print.
-        runner: of the event loop, in real or virtual time.
-        can_draw: whether pictures can be drawn.
+        run: how.
     """
     from daemon.demo_max2d_path import drive
 
-    result: PathResult = runner(drive(robot, seed, out, say))
-    show([result.numbers], _table, json)
-    if out is not None and can_draw():
-        from daemon.demo_max2d_path_pictures import draw
-
-        say(f"picture {draw(result, out)}")
-    return 0
+    return run.drive([partial(drive, robot, run.seed, run.out, say)], _table, _draw)
 
 
 def _table(rows: list[dict[str, Any]]) -> Table:
@@ -50,3 +37,9 @@ def _table(rows: list[dict[str, Any]]) -> Table:
     for number, piece in enumerate(rows[0]["pieces"]):
         table.add_row(str(number), *(words(piece[key]) for key in (*columns, *deviations)))
     return table
+
+
+def _draw(result: PathResult, folder: Path) -> Path:
+    from daemon.demo_max2d_path_pictures import draw
+
+    return draw(result, folder)
