@@ -7,14 +7,19 @@ from collections import Counter
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from canhelm.errors import CanhelmError, DeviceFault, Interlock, NodeAbsent, NotReady, Refused
 from drivers.contract import BrakeState
 from drivers.simulated.epos import SimulatedEpos
+from profiles.loader import load
+from profiles.schema import PairedSteerGeometry
 from vcan_tests.robot import Robot, running_robot
 
 MOMENTS_S = (0.001, 0.004, 0.008, 0.012, 0.03, 0.06)
 """From the first SDO of enabling a drive to its enabled state."""
+LIFE_TIME_S = 0.3
+"""Of the shipped robot."""
 
 
 def _begin(robot: Robot, method: str, **params: Any) -> asyncio.Task[Any]:
@@ -245,11 +250,32 @@ async def test_the_second_brake_is_not_released_where_a_drive_was_enabled_while_
 @pytest.mark.parametrize("seed", range(3))
 async def test_a_robot_whose_daemon_dies_stands_after_the_life_time_and_its_quick_stop_ramp(seed: int) -> None:
     async with running_robot(seed=seed, expect_errors=True) as robot:
-        network, drives = robot.app.profile.network, robot.app.profile.drives.values()
+        drives = robot.app.profile.drives.values()
         driving = _begin(robot, "drive.parallel", angle_deg=0.0, speed_m_s=0.5, duration_s=60.0)
         await robot.until(lambda: robot.speed_m_s > 0.49)
         await robot.app.bus.close()
         ramp_s = 0.5 / min(drive.quick_stop_m_s2 for drive in drives)
-        await asyncio.sleep(1e-3 * network.guard_time_ms * network.life_time_factor + ramp_s + 0.05)
+        await asyncio.sleep(LIFE_TIME_S + ramp_s + 0.05)
         assert robot.fastest_wheel_m_s < 0.01
         await driving
+
+
+@pytest.mark.parametrize("moment_s", [0.18, 0.21, 0.24, 0.27])
+@pytest.mark.parametrize(("lead_m", "swinging_s"), [(1e-6, 0.0), (0.005, 0.03)])
+async def test_a_turning_pair_whose_daemon_dies_stands_likewise_but_for_what_its_tyres_have_stored(
+    lead_m: float, swinging_s: float, moment_s: float
+) -> None:
+    """Contact points before its steering axes let it push the body, against which the other pair's wheels hold."""
+    max2d = load("max2d").profile
+    assert isinstance(max2d.vehicle, PairedSteerGeometry)
+    profile = replace(max2d, vehicle=replace(max2d.vehicle, contact_lead_m=lead_m))
+    async with running_robot(profile, expect_errors=True) as robot:
+        speed_m_s = profile.limits.steering_rim_speed_m_s
+        steering = _begin(robot, "steer", pair="front", angle_deg=80.0)
+        await robot.until(lambda: robot.fastest_wheel_m_s > 0.9 * speed_m_s)
+        await asyncio.sleep(moment_s)
+        await robot.app.bus.close()
+        ramp_s = speed_m_s / min(drive.quick_stop_m_s2 for drive in profile.drives.values())
+        await asyncio.sleep(LIFE_TIME_S + ramp_s + 0.05 + swinging_s)
+        assert robot.fastest_wheel_m_s < 0.01
+        await steering
