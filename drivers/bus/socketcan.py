@@ -19,7 +19,7 @@ from typing import Any
 
 from canhelm.errors import BusOff
 from drivers.bus import can_errors
-from drivers.bus.can_link import read_link
+from drivers.bus.can_link import IS_BUS_OFF, read_link
 from drivers.bus.contract import Bus, FrameHandler
 from drivers.bus.controller import Controller
 from drivers.bus.interface_load import NETWORK_DEVICES, InterfaceLoad
@@ -197,7 +197,8 @@ class SocketCanBus(Bus):
             return
         can_id, data = frame
         if can_id & ERROR_FLAG:
-            self._take_error(can_id, data)
+            self.counters.error_frames += 1
+            self._follow(can_id, data)
             return
         for tap in tuple(self.taps):
             tap(can_id, data, stamp)
@@ -220,8 +221,8 @@ class SocketCanBus(Bus):
         self.overflowed += (lost - self._link_overflowed) & 0xFFFF_FFFF
         self._link_overflowed = lost
 
-    def _take_error(self, can_id: int, data: bytes) -> None:
-        self.counters.error_frames += 1
+    def _follow(self, can_id: int, data: bytes) -> None:
+        """Take what an error frame says of the controller."""
         self._controller.take(can_id, data)
         if self._controller.bus_off:
             self.down = "bus-off"
@@ -262,16 +263,18 @@ class SocketCanBus(Bus):
         except OSError as error:
             self._disconnect()
             raise self._bus_off(error) from error
-        self._require_bit_rate()
+        found = read_link(self.name)
+        self._require_bit_rate(found.bit_rate)
         self._link_overflowed = 0
         self._reopen_s = FIRST_REOPEN_S
         self._loop.add_reader(link.fileno(), self._on_readable)
         self._recover()
+        if found.state == IS_BUS_OFF:
+            self._follow(can_errors.BUS_OFF, b"")
         self._look()
 
-    def _require_bit_rate(self) -> None:
+    def _require_bit_rate(self, rate: int | None) -> None:
         """Take no part with another bit rate than the network's: it would destroy the others' frames."""
-        rate = read_link(self.name).bit_rate
         if rate not in (None, self.bit_rate):
             self._disconnect()
             self.down = f"it has {rate} bit/s, the profile says {self.bit_rate}"

@@ -10,6 +10,7 @@ import struct
 import pytest
 
 from canhelm.errors import BusOff
+from drivers.bus.can_link import IS_BUS_OFF, read_link
 from drivers.bus.socketcan import SocketCanBus
 from drivers.bus.socketcan_frames import make_frame
 from vcan_tests.kernel.slcan_adapter import SlcanAdapter
@@ -127,6 +128,17 @@ async def test_bus_off_takes_the_bus_down_until_the_interface_was_restarted(capl
             bus.send(0x203)
             await until(lambda: adapter.frames == ["t2010", "t2030"])
     assert sum("can0 is bus-off" in message and "termination" in message for message in caplog.messages) == 1
+
+
+async def test_an_interface_that_was_bus_off_before_it_was_opened_is_told_so() -> None:
+    with SlcanAdapter(bit_rate=BIT_RATE) as adapter:
+        adapter.report_state("bus-off", tx_errors=255)
+        await until(lambda: read_link("can0").state == IS_BUS_OFF)
+        async with opened("can0") as bus:
+            assert (bus.down, bus.details()["bus_offs"]) == ("bus-off", 1)
+            adapter.down()
+            adapter.up()
+            await until(lambda: bus.down is None)
 
 
 async def test_a_frame_from_others_ends_bus_off(one: SocketCanBus, raw: socket.socket) -> None:
