@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import Any, Final
 
-from canhelm.errors import LimitExceeded, Refused, UsageError
+from canhelm.errors import Refused, UsageError
 from daemon.loops.ackermann import wheel_speeds
 from daemon.loops.ackermann_drive import CarLaw, CarTarget, car_kinematics
 from daemon.loops.articulated import ArticulatedVehicle
@@ -23,7 +23,7 @@ from daemon.runtime.path_commands import PathRequest
 from daemon.runtime.path_motions import FollowedPath, PathMotion
 from daemon.runtime.steered_vehicle import SteeredVehicle
 from daemon.runtime.streams import valid_for_s
-from daemon.runtime.vehicle import Stick, both_ways
+from daemon.runtime.vehicle import Stick, both_ways, odometry_status, require_at_most
 from drivers.contract import Drive, SteeringEncoder
 from profiles.schema import Profile
 from profiles.steered import CarGeometry
@@ -31,7 +31,6 @@ from profiles.steered import CarGeometry
 STEERING_SHARE: Final = 0.9
 """Of the steering angle, what a path may need; the rest is left to the law."""
 NO_REVERSE: Final = "this car has no reverse gear: none of its wheels turns backwards"
-_ROUNDING: Final = 1e-9
 
 
 class CarVehicle(SteeredVehicle):
@@ -93,7 +92,7 @@ class CarVehicle(SteeredVehicle):
             raise UsageError("the speed is not a finite number", remedy="give m/s")
         if speed < 0:
             raise Refused(NO_REVERSE, value=speed, remedy="give a positive speed, and turn round forwards")
-        _at_most("speed", speed, self._limits.speed_m_s, "m/s", "speed_m_s")
+        require_at_most("speed", speed, self._limits.speed_m_s, "m/s", "speed_m_s")
         return speed
 
     def set_point(self, params: dict[str, Any]) -> CarTarget:
@@ -107,7 +106,7 @@ class CarVehicle(SteeredVehicle):
             return CarTarget(self._speed(params), heading_rad=heading)
         if direction_deg:
             raise UsageError("a direction and a steering angle contradict each other", remedy="give one of them")
-        _at_most("steering angle", abs(steering_deg), self._geometry.steering.limit_deg, "deg", "limit_deg")
+        require_at_most("steering angle", abs(steering_deg), self._geometry.steering.limit_deg, "deg", "limit_deg")
         return CarTarget(self._speed(params), steering_rad=math.radians(steering_deg))
 
     def sticks(self) -> dict[str, Stick]:
@@ -119,13 +118,13 @@ class CarVehicle(SteeredVehicle):
         speed, front_deg = self._speed(params), float(params["front_deg"])
         if params["rear_deg"]:
             raise Refused("the rear wheels of this car do not steer", value=params["rear_deg"], remedy="give --rear 0")
-        _at_most("steering angle", abs(front_deg), self._geometry.steering.limit_deg, "deg", "limit_deg")
+        require_at_most("steering angle", abs(front_deg), self._geometry.steering.limit_deg, "deg", "limit_deg")
         steering = math.radians(front_deg)
         slope = abs(math.tan(steering)) / self._geometry.wheelbase_m
         grip = math.sqrt(self._limits.lateral_acceleration_m_s2 / slope) if slope else math.inf
-        _at_most("speed on this arc", speed, grip, "m/s", "lateral_acceleration_m_s2 allows")
+        require_at_most("speed on this arc", speed, grip, "m/s", "lateral_acceleration_m_s2 allows")
         wheels = self._limits.wheel_speed_m_s / (1.0 + self._geometry.track_m / 2 * slope)
-        _at_most("speed on this arc", speed, wheels, "m/s", "wheel_speed_m_s of the outer wheel allows")
+        require_at_most("speed on this arc", speed, wheels, "m/s", "wheel_speed_m_s of the outer wheel allows")
         return CarTarget(speed, steering_rad=steering, distance_m=speed * float(params["duration_s"]))
 
     # --- paths -------------------------------------------------------------------------------------------------
@@ -177,11 +176,7 @@ class CarVehicle(SteeredVehicle):
             "type": self._geometry.type,
             "methods": list(self.methods),
             "steering_deg": round(math.degrees(self.encoders[0].heading_rad), 3),
-            "odometry": {
-                "x_m": round(pose.x_m, 4),
-                "y_m": round(pose.y_m, 4),
-                "yaw_deg": round(math.degrees(pose.yaw_rad), 3),
-            },
+            "odometry": odometry_status(pose),
         }
 
 
@@ -193,14 +188,3 @@ def _refuse_reverse(request: PathRequest) -> None:
     for number, piece in enumerate(request.spec.pieces):
         if piece.drive == "backward":
             raise Refused(NO_REVERSE, object=f"pieces[{number}]", remedy=remedy)
-
-
-def _at_most(what: str, value: float, limit: float, unit: str, name: str) -> None:
-    if value > limit * (1 + _ROUNDING):
-        allowed = math.floor(limit * 1000 * (1 + _ROUNDING)) / 1000
-        raise LimitExceeded(
-            f"a {what} of {value:g} {unit} is beyond the limit",
-            value=round(value, 6),
-            limit=f"{name} {allowed:g}",
-            remedy=f"ask for at most {allowed:g} {unit}",
-        )

@@ -18,7 +18,7 @@ from daemon.runtime.differential_motions import BrickMoves, BrickWheels, PoseMot
 from daemon.runtime.differential_stream import DifferentialStream, SetPoint
 from daemon.runtime.motions import Motion
 from daemon.runtime.streams import valid_for_s
-from daemon.runtime.vehicle import Stick, Vehicle, both_ways
+from daemon.runtime.vehicle import Stick, Vehicle, both_ways, odometry_status, require_at_most
 from drivers.contract import Drive
 from drivers.nxt.motors import NxtDrive
 from profiles.bricks import DifferentialGeometry, NxtMotorConfig
@@ -28,7 +28,6 @@ GAINS = {"slow": SLOW_CYCLE_GAINS, "report": REPORT_GAINS}
 TOLERANCE_M, TOLERANCE_DEG, TIMEOUT_S = 0.002, 1.0, 30.0
 FARTHEST_DEG = 1e8
 """A brick counts to 2^31."""
-_ROUNDING = 1e-9
 
 
 class DifferentialVehicle(Vehicle):
@@ -93,8 +92,10 @@ class DifferentialVehicle(Vehicle):
             raise Refused("a robot on two wheels only drives forward and backward, and turns", remedy="give a yaw rate")
         wanted = SetPoint(float(params["speed_m_s"]), math.radians(params.get("yaw_rate_deg_s") or 0.0))
         limits = self.profile.limits
-        _at_most("speed", abs(wanted.forward_m_s), limits.speed_m_s, "m/s", "speed_m_s")
-        _at_most("yaw rate", math.degrees(abs(wanted.yaw_rate_rad_s)), limits.yaw_rate_deg_s, "deg/s", "yaw_rate_deg_s")
+        require_at_most("speed", abs(wanted.forward_m_s), limits.speed_m_s, "m/s", "speed_m_s")
+        require_at_most(
+            "yaw rate", math.degrees(abs(wanted.yaw_rate_rad_s)), limits.yaw_rate_deg_s, "deg/s", "yaw_rate_deg_s"
+        )
         return wanted
 
     def sticks(self) -> dict[str, Stick]:
@@ -114,7 +115,7 @@ class DifferentialVehicle(Vehicle):
         """Under feedback, no faster than asked for and allowed."""
         speed = params.get("speed_m_s")
         limit = self.profile.limits.speed_m_s
-        _at_most("speed", speed or 0.0, limit, "m/s", "speed_m_s")
+        require_at_most("speed", speed or 0.0, limit, "m/s", "speed_m_s")
         reach, longest_m = params.get("tolerance_m") or TOLERANCE_M, _longest_m([self.odometry.pose, *goals])
         settings = SeekSettings(
             Tolerance(reach, reach, math.radians(params.get("tolerance_deg") or TOLERANCE_DEG)),
@@ -184,23 +185,12 @@ class DifferentialVehicle(Vehicle):
         return {
             "type": DifferentialGeometry.type,
             "methods": list(self.methods),
-            "odometry": {
-                "x_m": round(pose.x_m, 4) + 0.0,
-                "y_m": round(pose.y_m, 4) + 0.0,
-                "yaw_deg": round(math.degrees(pose.yaw_rad), 3) + 0.0,
-            },
+            "odometry": odometry_status(pose),
             "velocity": {
                 "forward_m_s": round((right + left) / 2, 4) + 0.0,
                 "yaw_rate_deg_s": round(math.degrees((right - left) / 2 / self._drive.half_track_m), 2) + 0.0,
             },
         }
-
-
-def _at_most(what: str, value: float, limit: float, unit: str, name: str) -> None:
-    if value > limit * (1 + _ROUNDING):
-        remedy = f"ask for at most {limit:g} {unit}"
-        message = f"a {what} of {value:g} {unit} is beyond the limit"
-        raise LimitExceeded(message, value=value, limit=f"{name} {limit:g}", remedy=remedy)
 
 
 def _longest_m(poses: Sequence[Pose]) -> float:

@@ -6,11 +6,11 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from canhelm.errors import LimitExceeded, Refused, UsageError
+from canhelm.errors import Refused, UsageError
 from daemon.loops.accelerometer import Mounting
 from daemon.loops.jerk_limit import JerkLimitedGuide
 from daemon.loops.measurement import Measurement
-from daemon.loops.omni_drive import OmniLaw
+from daemon.loops.omni_drive import PATIENCE_S, OmniLaw
 from daemon.loops.omni_guide import GoalGuide, Guide, PublishedGuide, Signals, Twist, TwistGuide
 from daemon.loops.omni_senses import OmniSenses, omni_kinematics, omni_observer
 from daemon.loops.planner import FARTHEST, PlanarLimits, PlanarState
@@ -20,7 +20,7 @@ from daemon.runtime.motions import Motion
 from daemon.runtime.omni_motions import GoalMotion, OmniMotion, TwistMotion, TwistStream
 from daemon.runtime.rest import AT_REST_M_S
 from daemon.runtime.streams import valid_for_s
-from daemon.runtime.vehicle import Stick, Vehicle, both_ways
+from daemon.runtime.vehicle import Stick, Vehicle, both_ways, odometry_status, require_at_most
 from drivers.contract import Accelerometer as Sensor
 from drivers.contract import Drive, DriveState
 from profiles.schema import OmniGeometry, Profile
@@ -29,7 +29,6 @@ SLOWEST_M_S = 1e-3
 """Slowest speed limit that is planned with."""
 SLIP_BY_CURRENTS_M_S2, GRIP_BY_CURRENTS_M_S2 = 0.5, 0.35
 """Levels at which slip begins and ends where currents tell the acceleration: above their errors while it turns."""
-_ROUNDING = 1e-9
 
 
 class OmniVehicle(Vehicle):
@@ -104,6 +103,10 @@ class OmniVehicle(Vehicle):
         speed, rate = both_ways(self.limits.speed), both_ways(self.profile.limits.yaw_rate_deg_s)
         return {"speed": speed, "sideways": speed, "yaw_rate": rate}
 
+    def ramp_s(self) -> float:
+        """The ramps, and what the law gives the robot to come to where it should stand."""
+        return super().ramp_s() + PATIENCE_S
+
     def to_goal(
         self,
         goal: PlanarState,
@@ -164,8 +167,8 @@ class OmniVehicle(Vehicle):
         twist = speed * math.cos(angle), speed * math.sin(angle), rate
         if not all(map(math.isfinite, twist)):
             raise UsageError("a direction, speed or rate is not a finite number", remedy="give finite numbers")
-        _at_most("speed", abs(speed), self.limits.speed, "m/s", "speed_m_s")
-        _at_most("yaw rate", math.degrees(abs(rate)), math.degrees(self.limits.rate), "deg/s", "yaw_rate_deg_s")
+        require_at_most("speed", abs(speed), self.limits.speed, "m/s", "speed_m_s")
+        require_at_most("yaw rate", math.degrees(abs(rate)), math.degrees(self.limits.rate), "deg/s", "yaw_rate_deg_s")
         return twist
 
     def _on_twist(self, twist: Twist) -> tuple[OmniLaw, TwistGuide]:
@@ -192,9 +195,9 @@ class OmniVehicle(Vehicle):
                 "a place, heading, velocity or limit is not a finite number, or too large, or a limit not positive",
                 remedy=f"give numbers below {FARTHEST:g}",
             )
-        _at_most("speed", limits.speed, self.limits.speed, "m/s", "speed_m_s")
-        _at_most("acceleration", limits.acceleration, self.limits.acceleration, "m/s^2", "acceleration_m_s2")
-        _at_most("speed at the goal", math.hypot(goal.vx, goal.vy), limits.speed, "m/s", "speed_m_s")
+        require_at_most("speed", limits.speed, self.limits.speed, "m/s", "speed_m_s")
+        require_at_most("acceleration", limits.acceleration, self.limits.acceleration, "m/s^2", "acceleration_m_s2")
+        require_at_most("speed at the goal", math.hypot(goal.vx, goal.vy), limits.speed, "m/s", "speed_m_s")
 
     def status(self) -> dict[str, Any]:
         """Odometry, motion and acceleration of the centre."""
@@ -202,11 +205,7 @@ class OmniVehicle(Vehicle):
         return {
             "type": OmniGeometry.type,
             "methods": list(self.methods),
-            "odometry": {
-                "x_m": round(pose.x_m, 4),
-                "y_m": round(pose.y_m, 4),
-                "yaw_deg": round(math.degrees(pose.yaw_rad), 3),
-            },
+            "odometry": odometry_status(pose),
             "velocity": {
                 "forward_m_s": round(vx, 4),
                 "left_m_s": round(vy, 4),
@@ -214,13 +213,3 @@ class OmniVehicle(Vehicle):
             },
             "acceleration_m_s2": None if centre is None else [round(value, 3) for value in centre],
         }
-
-
-def _at_most(what: str, value: float, limit: float, unit: str, name: str) -> None:
-    if value > limit * (1 + _ROUNDING):
-        raise LimitExceeded(
-            f"a {what} of {value:g} {unit} is beyond the limit",
-            value=round(value, 6),
-            limit=f"{name} {limit:g}",
-            remedy=f"ask for at most {limit:g} {unit}",
-        )

@@ -7,21 +7,20 @@ import logging
 import math
 from typing import Any
 
-from canhelm.errors import DeviceFault, LimitExceeded, Refused, UsageError
+from canhelm.errors import DeviceFault, Refused, UsageError
 from daemon.loops.measurement import Measurement
 from daemon.loops.odometry import MAX_STEP_M, Pose, moved_along_arc
 from daemon.loops.own_vehicle import OwnVehicle, Twist
 from daemon.runtime.motions import Motion
 from daemon.runtime.own_motions import OwnMotion, OwnStream
 from daemon.runtime.streams import valid_for_s
-from daemon.runtime.vehicle import Stick, Vehicle, both_ways
+from daemon.runtime.vehicle import Stick, Vehicle, both_ways, odometry_status, require_at_most
 from drivers.contract import Brake, Drive, SteeringEncoder
 from profiles.own_class import load_class
 from profiles.own_vehicle import OwnGeometry
 from profiles.schema import Profile
 
 LOGGER = logging.getLogger("canhelm")
-_ROUNDING = 1e-9
 
 
 class OwnKindVehicle(Vehicle):
@@ -100,8 +99,8 @@ class OwnKindVehicle(Vehicle):
         if not all(map(math.isfinite, twist)):
             raise UsageError("a direction, speed or rate is not a finite number", remedy="give finite numbers")
         limits = self.profile.limits
-        _at_most("speed", abs(speed), limits.speed_m_s, "m/s", "speed_m_s")
-        _at_most("yaw rate", abs(rate_deg_s), limits.yaw_rate_deg_s, "deg/s", "yaw_rate_deg_s")
+        require_at_most("speed", abs(speed), limits.speed_m_s, "m/s", "speed_m_s")
+        require_at_most("yaw rate", abs(rate_deg_s), limits.yaw_rate_deg_s, "deg/s", "yaw_rate_deg_s")
         if objection := self._law.objection(twist):
             raise Refused(objection, remedy="ask for another direction, speed or yaw rate")
         return twist
@@ -135,24 +134,10 @@ class OwnKindVehicle(Vehicle):
             "kind": self._geometry.kind,
             "methods": list(self.methods),
             "failure": self.failure,
-            "odometry": {
-                "x_m": round(self.pose.x_m, 4),
-                "y_m": round(self.pose.y_m, 4),
-                "yaw_deg": round(math.degrees(self.pose.yaw_rad), 3),
-            },
+            "odometry": odometry_status(self.pose),
             "velocity": {
                 "forward_m_s": round(forward, 4),
                 "left_m_s": round(left, 4),
                 "yaw_rate_deg_s": round(math.degrees(rate), 3),
             },
         }
-
-
-def _at_most(what: str, value: float, limit: float, unit: str, name: str) -> None:
-    if value > limit * (1 + _ROUNDING):
-        raise LimitExceeded(
-            f"a {what} of {value:g} {unit} is beyond the limit",
-            value=round(value, 6),
-            limit=f"{name} {limit:g}",
-            remedy=f"ask for at most {limit:g} {unit}",
-        )

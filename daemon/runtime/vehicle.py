@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from enum import StrEnum
-from typing import Any
+from typing import Any, Final
 
+from canhelm.errors import LimitExceeded
 from daemon.loops.limits import Gate
 from daemon.loops.measurement import Command, Measurement
+from daemon.loops.odometry import Pose
 from daemon.runtime.motions import Motion
 from daemon.runtime.streams import valid_for_s
 from drivers.contract import Brake, BrakeState, Drive, SteeringEncoder
 from profiles.schema import Profile
+
+_ROUNDING: Final = 1e-9
 
 
 class VehicleState(StrEnum):
@@ -34,6 +38,27 @@ Stick = tuple[float, float]
 def both_ways(largest: float) -> Stick:
     """As far to the one side as to the other."""
     return (-largest, largest)
+
+
+def require_at_most(what: str, value: float, limit: float, unit: str, name: str) -> None:
+    """Raise LimitExceeded where a value that is asked for is beyond a limit of this name."""
+    if value > limit * (1 + _ROUNDING):
+        allowed = math.floor(limit * 1000 * (1 + _ROUNDING)) / 1000
+        raise LimitExceeded(
+            f"a {what} of {value:g} {unit} is beyond the limit",
+            value=round(value, 6),
+            limit=f"{name} {allowed:g}",
+            remedy=f"ask for at most {allowed:g} {unit}",
+        )
+
+
+def odometry_status(pose: Pose) -> dict[str, float]:
+    """A pose for ``status``; its angle is not wrapped."""
+    return {
+        "x_m": round(pose.x_m, 4) + 0.0,
+        "y_m": round(pose.y_m, 4) + 0.0,
+        "yaw_deg": round(math.degrees(pose.yaw_rad), 3) + 0.0,
+    }
 
 
 class Vehicle(ABC):
@@ -114,6 +139,12 @@ class Vehicle(ABC):
     def sticks(self) -> dict[str, Stick]:
         """What a gamepad may give: speed, sideways [m/s], yaw_rate [deg/s], steering, direction [deg]."""
         return {}
+
+    def ramp_s(self) -> float:
+        """Time from the largest values of ``drive.set`` to rest, by the law's own ramps."""
+        limits = self.profile.limits
+        turning_s = limits.yaw_rate_deg_s / limits.yaw_acceleration_deg_s2 if "yaw_rate" in self.sticks() else 0.0
+        return max(limits.speed_m_s / limits.acceleration_m_s2, turning_s)
 
     def observe(self, measurement: Measurement) -> None:
         """Told of every cycle's measurement (odometry)."""
