@@ -119,6 +119,8 @@ class App:
         localiser = Localiser(self.profile.localisation, self.vehicle, self.supervisor.log)
         self.supervisor.observers.append(localiser.step)
         commands.handlers |= localiser.handlers
+        if commands.paths is not None:
+            commands.paths.located = localiser.located
         self.service.localiser = localiser
         if self.network is not None and self.network.scanner is not None:
             self.network.scanner.on_scan = localiser.take

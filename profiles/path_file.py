@@ -129,15 +129,23 @@ def load_path_file(name_or_path: str | Path) -> PathFile:
         try:
             spec = msgspec.convert(data, PathSpec)
         except msgspec.ValidationError as error:
-            what, _, place = str(error).partition(" - at `$")
-            piece = _PIECE.search(place)
+            where, what, remedy = mistake_of(error)
+            piece = _PIECE.search(where)
             line = lines[int(piece[1])] if piece and int(piece[1]) < len(lines) else 1
-            text = what.replace("`", "").replace("Object contains", "has an").replace("Object missing", "has no")
-            where = place.strip("`.") or "the file"
-            raise _mistake(file, line, f"{where}: {text}", "docs/paths.md has the keys of a path file") from None
+            raise _mistake(file, line, f"{where or 'the file'}: {what}", remedy) from None
     if not spec.pieces:
         raise _mistake(file, 1, "the path is empty", "give it at least one line or arc under pieces:")
     return PathFile(file, spec, lines)
+
+
+def mistake_of(error: msgspec.ValidationError) -> tuple[str, str, str]:
+    """What is wrong with a path that somebody wrote: the place as ``pieces[3].line_m``, the mistake, what to do."""
+    what, _, place = str(error).partition(" - at `$")
+    where = place.strip("`.")
+    if where.endswith(".drive"):
+        return where, what.replace("Invalid enum value", "is"), "write forward or backward"
+    what = what.replace("`", "").replace("Object contains", "has an").replace("Object missing", "has no")
+    return where, what, "docs/paths.md has the keys of a path"
 
 
 @contextmanager
@@ -171,6 +179,8 @@ def _composed(file: Path) -> yaml.Node:
         raise _mistake(file, mark.line + 1 if mark else 1, what, "mend the syntax") from None
     except yaml.YAMLError:
         raise _mistake(file, 1, "YAML: it has a character that is not allowed", "remove it") from None
+    if isinstance(root, yaml.SequenceNode) and root.value:
+        raise _mistake(file, 1, "is a list, not a mapping", "write pieces: above it, and indent it")
     if not isinstance(root, yaml.MappingNode):
         raise _mistake(file, 1, "the path is empty", "give it at least one line or arc under pieces:")
     return root

@@ -152,12 +152,14 @@ def _fits(param: Param, value: Any) -> bool:
 def _check_range(method: Method, param: Param, value: float) -> None:
     low, high = param.minimum, param.maximum
     if (low is not None and value < low) or (high is not None and value > high):
-        limit = f"{_digits(low)} .. {_digits(high)} {param.unit}".strip()
-        raise _wrong(method, param.name, "is out of range", value, f"stay within {limit}", limit)
+        limit = f"{_range(low, high)} {param.unit}".strip()
+        raise _wrong(method, param.name, "is out of range", value, f"give {limit}", limit)
 
 
-def _digits(bound: float | None) -> str:
-    return "" if bound is None else f"{bound:.12g}"
+def _range(low: float | None, high: float | None) -> str:
+    if low is None:
+        return f"at most {high:.12g}"
+    return f"at least {low:.12g}" if high is None else f"{low:.12g} to {high:.12g}"
 
 
 def _wrong(method: Method, name: str, what: str, value: Any, remedy: str, limit: str | None = None) -> UsageError:

@@ -32,6 +32,7 @@ class Reading:
     sensed_deg: float
 
 
+_WROTE: Final = "give a file that `canhelm calibrate` wrote"
 COLUMNS: Final = tuple(field.name for field in fields(Reading))
 
 
@@ -86,10 +87,12 @@ def read_readings(path: Path) -> list[Reading]:
     try:
         with path.open(encoding="utf-8", newline="") as file:
             rows = list(csv.reader(file))
-    except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(f"cannot read {path}: {error}", remedy="give a file that `canhelm calibrate` wrote") from None
+    except OSError as error:
+        raise UsageError(f"cannot read {path}: {error.strerror}", remedy=_WROTE) from None
+    except (UnicodeDecodeError, csv.Error):
+        raise UsageError(f"{path} is no text with readings", remedy=_WROTE) from None
     if not rows or tuple(rows[0]) != COLUMNS:
-        raise UsageError(f"{path}:1 is not {','.join(COLUMNS)}", remedy="give a file that `canhelm calibrate` wrote")
+        raise UsageError(f"{path}:1 is not {','.join(COLUMNS)}", remedy=_WROTE)
     return [_reading(row, f"{path}:{number}") for number, row in enumerate(rows[1:], start=2)]
 
 

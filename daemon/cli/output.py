@@ -52,7 +52,14 @@ def show(
         console().print(table(data))
     else:
         for item in [data] if isinstance(data, Mapping) else data:
-            print("\n".join(f"{key}: {words(value)}" for key, value in item.items()))
+            print("\n".join(line for key, value in item.items() for line in _field_lines(key, value)))
+
+
+def _field_lines(key: str, value: Any) -> list[str]:
+    """A field for people; a list of objects has a line each."""
+    if isinstance(value, list | tuple) and value and all(isinstance(item, Mapping) for item in value):
+        return [f"{key}:", *(f"  {number}: {words(item)}" for number, item in enumerate(value))]
+    return [f"{key}: {words(value)}"]
 
 
 def plain(value: Any) -> Any:

@@ -26,7 +26,7 @@ SLIGHTEST_RAD = 1e-5
 
 def record(options: Options, name: str, duration_s: float | None, rate_hz: float) -> int:
     """Write where the vehicle is, row by row, until the time is over or somebody interrupts; the exit code."""
-    with options.client() as client, _opened(name, "w") as file:
+    with options.client() as client, _opened(name, "x") as file:
         if "odometry" not in client.status()["vehicle"]:
             raise Refused("this vehicle does not know where it is", remedy="record one that has an odometry")
         rows = csv.writer(file)
@@ -81,7 +81,7 @@ def fit(name: str, out: str, tolerance_m: float, json: bool | None) -> int:
     runs = [_fitted(*run, tolerance_m) for run in _runs(*_read(name))]
     if not runs:
         raise UsageError(f"{name}: the vehicle hardly moved", value=name, remedy="record while it drives")
-    with _opened(out, "w") as file:
+    with _opened(out, "x") as file:
         file.writelines(f"{line}\n" for line in _path_lines(name, runs))
     pieces = [piece for run in runs for piece in run.pieces]
     numbers = {
@@ -94,9 +94,11 @@ def fit(name: str, out: str, tolerance_m: float, json: bool | None) -> int:
     return 0
 
 
-def _opened(name: str, mode: Literal["r", "w"]) -> TextIO:
+def _opened(name: str, mode: Literal["r", "x"]) -> TextIO:
     try:
         return Path(name).open(mode, newline="", encoding="utf-8")
+    except FileExistsError:
+        raise UsageError(f"{name} exists already", value=name, remedy="name a new file, or remove it first") from None
     except OSError as error:
         raise UsageError(f"{name}: {error.strerror}", value=name, remedy="name a file that can be opened") from None
 
@@ -104,20 +106,28 @@ def _opened(name: str, mode: Literal["r", "w"]) -> TextIO:
 def _read(name: str) -> tuple[list[Pose], list[Pose]]:
     """Poses of the truck, and of the unit that is the reference backwards."""
     trucks, trailers = [], []
-    with _opened(name, "r") as file:
-        for number, row in enumerate(csv.reader(file), start=1):
-            if number > LONGEST_RECORD:
-                raise UsageError(f"{name}: more than {LONGEST_RECORD} rows", value=name, remedy="record it in parts")
-            if number == 1 and tuple(row) == COLUMNS:
-                continue
-            try:
-                truck = _pose(row[1:4])
-                trucks.append(truck)
-                trailers.append(_pose(row[4:7]) if row[4] else truck)
-            except (ValueError, IndexError):
-                what = f"{name}:{number}: is no row of a record"
-                raise UsageError(what, value=name, remedy=f"its columns are {', '.join(COLUMNS)}") from None
+    for number, row in enumerate(_rows(name), start=1):
+        if number > LONGEST_RECORD:
+            raise UsageError(f"{name}: more than {LONGEST_RECORD} rows", value=name, remedy="record it in parts")
+        if number == 1 and tuple(row) == COLUMNS:
+            continue
+        try:
+            truck = _pose(row[1:4])
+            trucks.append(truck)
+            trailers.append(_pose(row[4:7]) if row[4] else truck)
+        except (ValueError, IndexError):
+            what = f"{name}:{number}: is no row of a record"
+            raise UsageError(what, value=name, remedy=f"its columns are {', '.join(COLUMNS)}") from None
     return trucks, trailers
+
+
+def _rows(name: str) -> Iterator[list[str]]:
+    with _opened(name, "r") as file:
+        try:
+            yield from csv.reader(file)
+        except (UnicodeDecodeError, csv.Error):
+            what = f"{name}: is no text, and no record"
+            raise UsageError(what, value=name, remedy="give a file that `canhelm drive record` wrote") from None
 
 
 def _pose(cells: Sequence[str]) -> Pose:

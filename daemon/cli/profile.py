@@ -14,7 +14,7 @@ from cyclopts import App, Parameter
 from canhelm.errors import ConfigError, Refused, UsageError
 from daemon.cli.output import Json, say, show, wants_json, words
 from profiles import catalogue
-from profiles.loader import CALIBRATION, SHIPPED, LoadedProfile, ProfileError, available, find, load
+from profiles.loader import CALIBRATION, SHIPPED, LoadedProfile, ProfileError, available, load
 from profiles.provenance import FieldPath, dotted
 from profiles.schema import SCHEMA_VERSION
 
@@ -34,10 +34,14 @@ name: {name}
 extends: {base}
 setup: needed   # `canhelm setup` looks at every wheel, encoder and brake first; `waived` drives without
 
+{sample}# limits:
+#   speed_m_s: {speed_m_s:g}
+"""
+
+
+_NEW_DRIVE = """\
 # drives:
-#   rear_right: {{node: 11, wheel_radius_m: 0.105}}
-# limits:
-#   speed_m_s: 0.8
+#   {name}: {{node: 11, wheel_radius_m: {radius_m:g}}}
 """
 
 
@@ -135,8 +139,12 @@ def new(name: str, /, *, extends: str = "max2d", out: Path | None = None) -> Non
         raise UsageError(
             f"{name!r} is no name of a robot", value=name, remedy="begin with a letter; use A-Z a-z 0-9 _ -"
         )
-    find(extends)
-    text = _NEW.format(name=name, base=extends, version=SCHEMA_VERSION)
+    base = load(extends).profile
+    sample = "".join(
+        _NEW_DRIVE.format(name=drive, radius_m=config.wheel_radius_m) for drive, config in [*base.drives.items()][:1]
+    )
+    speed = base.limits.speed_m_s
+    text = _NEW.format(name=name, base=extends, version=SCHEMA_VERSION, sample=sample, speed_m_s=speed)
     if out is None:
         print(text, end="")
         return

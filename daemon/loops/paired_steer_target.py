@@ -95,16 +95,21 @@ def check_target(geometry: PairedSteerGeometry, limits: Limits, target: PairedSt
     for name, heading in zip(PAIR_NAMES, target.headings_rad, strict=True):
         if heading is not None:
             _check_heading(geometry, limits, name, heading)
-    if abs(target.speed_m_s) > limits.speed_m_s * (1 + _ROUNDING):
-        raise LimitExceeded(
-            f"a speed of {target.speed_m_s:g} m/s is beyond the vehicle's limit",
-            value=target.speed_m_s,
-            limit=f"speed_m_s {limits.speed_m_s:g}",
-            remedy=f"ask for at most {limits.speed_m_s:g} m/s",
-        )
+    check_speed(limits, target.speed_m_s)
     if target.moves and target.rear_heading_rad is not None and target.front_heading_rad is not None:
         solution = solve_turning(geometry, target.rear_heading_rad, target.front_heading_rad, target.speed_m_s)
         _check_wheels(limits, target.speed_m_s, solution)
+
+
+def check_speed(limits: Limits, speed_m_s: float) -> None:
+    """Raise LimitExceeded for a speed that is beyond the vehicle's."""
+    if abs(speed_m_s) > limits.speed_m_s * (1 + _ROUNDING):
+        raise LimitExceeded(
+            f"a speed of {speed_m_s:g} m/s is beyond the vehicle's limit",
+            value=speed_m_s,
+            limit=f"speed_m_s {limits.speed_m_s:g}",
+            remedy=f"ask for at most {limits.speed_m_s:g} m/s",
+        )
 
 
 def _check_sense(target: PairedSteerTarget) -> None:
@@ -156,7 +161,7 @@ def turning_warnings(geometry: PairedSteerGeometry, solution: TurningSolution) -
     if rear * front < 0 and max(abs(rear), abs(front)) > SINGLE_CENTRE_LIMIT_RAD:
         worst = math.degrees(max(abs(angle) for angle in solution.mismatch_rad))
         warnings.append(
-            f"headings beyond {SINGLE_CENTRE_LIMIT_RAD:g} rad: wheels move up to {worst:.0f} deg off their headings, "
-            "the driven arc will differ from the computed one"
+            f"headings beyond {math.degrees(SINGLE_CENTRE_LIMIT_RAD):.0f} deg: wheels move up to {worst:.0f} deg off "
+            "their headings, the driven arc will differ from the computed one"
         )
     return tuple(warnings)

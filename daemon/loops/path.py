@@ -21,6 +21,8 @@ STRAIGHT: Final = 1e-9
 """Curvature [1/m] below which a piece is a line: a bow of half a millimetre in a kilometre."""
 MAX_GAP_M: Final = 0.005
 MAX_KINK_RAD: Final = math.radians(0.5)
+LONGEST_M: Final = 10_000.0
+"""Of one piece: nobody means more, and places stay exact to a thousandth of a millimetre."""
 _AT_CENTRE_M: Final = 1e-9
 _ROUNDING_M: Final = 1e-9
 
@@ -132,6 +134,7 @@ class Path:
     Attributes:
         pieces: in the order of travel.
         sections: first and last piece of each section.
+        sharpest: highest curvature of a piece [1/m].
     """
 
     def __init__(self, pieces: Iterable[Piece], lead_m: float = 0.0) -> None:
@@ -148,28 +151,50 @@ class Path:
         """
         self.pieces: Final[list[Piece]] = []
         self.sections: Final[list[tuple[int, int]]] = []
+        self.sharpest = 0.0
         self._begin_m: Final[list[float]] = []
+        self._numbers: Final[list[int]] = []
         self._lead_m = lead_m
         for piece in pieces:
             self.append(piece)
         if not self.pieces:
             raise UsageError("the path is empty", remedy="give it at least one line or arc")
 
-    def append(self, piece: Piece) -> None:
-        """Let the path go on by a piece. Raises UsageError as the constructor does."""
+    def append(self, piece: Piece, told: int | None = None) -> None:
+        """Let the path go on by a piece.
+
+        Args:
+            piece: the next one.
+            told: number by which people know it, where several pieces come from one entry of a file; errors have it.
+
+        Raises:
+            UsageError: as the constructor does.
+        """
         number = len(self.pieces)
-        _check_numbers(number, piece)
+        told = number if told is None else told
+        _check_numbers(told, piece)
         if number:
             before = self.pieces[-1]
             if before.length_m == math.inf:
-                raise _not_finite(number - 1)
-            _check_joint(number, before, piece, self._lead_m)
+                raise _not_finite(self._numbers[-1])
+            _check_joint(self._numbers[-1], told, before, piece, self._lead_m)
         if number and before.backward == piece.backward:
             self.sections[-1] = (self.sections[-1][0], number)
         else:
             self.sections.append((number, number))
         self._begin_m.append(self._begin_m[-1] + before.length_m if number else 0.0)
+        self._numbers.append(told)
         self.pieces.append(piece)
+        self.sharpest = max(self.sharpest, abs(piece.curvature))
+
+    @property
+    def length_m(self) -> float:
+        """Length of all pieces [m]."""
+        return self._begin_m[-1] + self.pieces[-1].length_m
+
+    def told(self, piece: int) -> int:
+        """Number by which people know a piece."""
+        return self._numbers[piece]
 
     def section_length(self, section: int) -> float:
         """Length of a section [m]."""
@@ -220,7 +245,7 @@ def _not_finite(number: int) -> UsageError:
     return UsageError(f"piece {number} has a number that is not finite", object=f"piece {number}")
 
 
-def _check_joint(number: int, before: Piece, piece: Piece, lead_m: float) -> None:
+def _check_joint(before_number: int, number: int, before: Piece, piece: Piece, lead_m: float) -> None:
     heading = before.heading(before.length_m)
     x, y = before.point(before.length_m)
     lead = lead_m * (before.backward - piece.backward)
@@ -228,35 +253,44 @@ def _check_joint(number: int, before: Piece, piece: Piece, lead_m: float) -> Non
     kink = abs(wrap(piece.direction_rad + (math.pi if piece.backward else 0.0) - heading))
     where = f"piece {number}"
     if gap > MAX_GAP_M:
-        message = f"{where} begins {gap:.3f} m beside the end of piece {number - 1}"
+        message = f"{where} begins {gap:.3f} m beside the end of piece {before_number}"
         remedy = "let each piece begin where the last one ends"
-        raise UsageError(message, object=where, value=gap, limit=MAX_GAP_M, remedy=remedy)
+        limit = f"gap_m {MAX_GAP_M:g}"
+        raise UsageError(message, object=where, value=round(gap, 4), limit=limit, remedy=remedy)
     if kink > MAX_KINK_RAD:
-        message = f"the heading jumps by {math.degrees(kink):.1f} degrees at the beginning of {where}"
-        remedy = "join the pieces by an arc"
-        raise UsageError(message, object=where, value=kink, limit=MAX_KINK_RAD, remedy=remedy)
+        kink_deg = math.degrees(kink)
+        message = f"the heading jumps by {kink_deg:.1f} degrees at the beginning of {where}"
+        limit = f"kink_deg {math.degrees(MAX_KINK_RAD):g}"
+        raise UsageError(
+            message, object=where, value=round(kink_deg, 3), limit=limit, remedy="join the pieces by an arc"
+        )
 
 
 def check_piece(number: int, piece: Piece, forward_curvature: float, backward_curvature: float) -> None:
     """Refuse a piece that a vehicle cannot follow.
 
     Args:
-        number: of the piece in its path.
+        number: by which people know the piece.
         piece: to be driven.
         forward_curvature: highest that the vehicle holds when driving forwards [1/m].
         backward_curvature: likewise backwards; 0 for a vehicle without a reverse gear.
 
     Raises:
-        LimitExceeded: its radius is too small, or it is driven backwards and may not be; ``object`` names the piece.
+        LimitExceeded: its radius is too small, it is longer than ``LONGEST_M``, or it is driven backwards and may not
+            be; ``object`` names the piece.
     """
     limit, where = backward_curvature if piece.backward else forward_curvature, f"piece {number}"
     if piece.backward and limit <= 0:
         message = f"{where} is driven backwards, and the vehicle cannot"
         raise LimitExceeded(message, object=where, remedy="lead the path round forwards")
+    if piece.length_m > LONGEST_M:
+        message = f"{where} is {piece.length_m:g} m long"
+        longest = f"length_m {LONGEST_M:g}"
+        raise LimitExceeded(message, object=where, value=piece.length_m, limit=longest, remedy="drive it in parts")
     if abs(piece.curvature) > limit:
-        radius, least = 1 / abs(piece.curvature), f"{1 / limit:.3f}"
+        radius, least = 1 / abs(piece.curvature), f"{1 / limit:.3f} m"
         way = "backwards" if piece.backward else "forwards"
-        message = f"{where} has a radius of {radius:.3f} m, the vehicle needs {least} m {way}"
+        message = f"{where} has a radius of {radius:.3f} m, the vehicle needs {least} {way}"
         raise LimitExceeded(message, object=where, value=round(radius, 4), limit=least, remedy="widen the arc")
 
 
@@ -269,9 +303,11 @@ def check_run_out(path: Path, run_out_m: float) -> None:
     for section, (_, last) in enumerate(path.sections):
         length = path.section_length(section)
         if length < run_out_m:
-            message = f"the way to the end of piece {last} is {length:.3f} m, too short to be followed"
-            remedy = f"give the section at least {run_out_m:.3f} m"
-            raise LimitExceeded(message, object=f"piece {last}", value=length, limit=run_out_m, remedy=remedy)
+            where = f"piece {path.told(last)}"
+            message = f"the way to the end of {where} is {length:.3f} m, too short to be followed"
+            least = f"{run_out_m:.3f} m"
+            remedy = f"give the section at least {least}"
+            raise LimitExceeded(message, object=where, value=round(length, 4), limit=least, remedy=remedy)
 
 
 def join_waypoints(points: Sequence[Point], radius_m: float, backward: bool = False, lead_m: float = 0.0) -> Path:
@@ -306,7 +342,7 @@ def _rounded(points: Sequence[Point], radius_m: float, backward: bool, lead_m: f
         cut = 0.0 if cusp else radius_m * math.tan(abs(turn) / 2)
         straight = length - start_m - cut
         if straight < -_ROUNDING_M:
-            raise _short_leg(number, length, length - straight)
+            raise _short_leg(corner, length, length - straight)
         leg = _leg_to(corner, direction, straight, cut, backward)
         if straight > _ROUNDING_M:
             pieces.append(leg)
@@ -327,12 +363,17 @@ def _leg_to(corner: Point, direction: float, straight_m: float, cut_m: float, ba
 def _direction(number: int, points: Sequence[Point]) -> float:
     before, point = points[number - 1], points[number]
     if math.dist(before, point) < MAX_GAP_M:
-        where = f"waypoint {number}"
+        where = _waypoint(point)
         raise UsageError(f"{where} is where the one before it is", object=where, remedy="leave it out")
     return math.atan2(point[1] - before[1], point[0] - before[0])
 
 
-def _short_leg(number: int, length_m: float, needed_m: float) -> LimitExceeded:
-    message = f"the leg to waypoint {number} is {length_m:.3f} m long, its ends need {needed_m:.3f} m"
+def _short_leg(corner: Point, length_m: float, needed_m: float) -> LimitExceeded:
+    where, least = _waypoint(corner), f"{needed_m:.3f} m"
+    message = f"the leg to {where} is {length_m:.3f} m long, its ends need {least}"
     remedy = "move the waypoints apart, or round the corners with a smaller radius"
-    return LimitExceeded(message, object=f"waypoint {number}", value=length_m, limit=needed_m, remedy=remedy)
+    return LimitExceeded(message, object=where, value=round(length_m, 4), limit=least, remedy=remedy)
+
+
+def _waypoint(point: Point) -> str:
+    return f"waypoint [{point[0]:g}, {point[1]:g}]"

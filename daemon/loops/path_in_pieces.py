@@ -148,9 +148,10 @@ class PiecePlanner:
                 return covered
             count += 1 + count // 8
             yield None
+        where = f"piece {self._path.told(number)}"
         raise LimitExceeded(
-            f"piece {number} can be driven neither in lines nor in arcs that stay near it",
-            object=f"piece {number}",
+            f"{where} can be driven neither in lines nor in arcs that stay near it",
+            object=where,
             limit=f"heading_deg {self._limits.heading_deg:g}",
             remedy="widen its bends, or begin with another heading of the robot",
         )

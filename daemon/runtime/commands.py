@@ -30,6 +30,10 @@ class Commands:
         supervisor: what decides.
         network: the simulated network; None where it is real.
         workshop: where the simulated robot stands; None where it is real.
+
+    Attributes:
+        handlers: methods by name.
+        paths: those that follow paths; None where the vehicle does not.
     """
 
     def __init__(
@@ -54,9 +58,11 @@ class Commands:
             **WorkshopCommands(workshop).handlers,
             **GamepadCommands(supervisor.vehicle).handlers,
         }
+        self.paths: PathCommands | None = None
         driving: dict[str, Handler] = {method: self._vehicle_handler(method) for method in supervisor.vehicle.methods}
         if isinstance(supervisor.vehicle, PathVehicle):
-            driving |= PathCommands(supervisor, supervisor.vehicle).handlers
+            self.paths = PathCommands(supervisor, supervisor.vehicle)
+            driving |= self.paths.handlers
         self._driving = frozenset(driving)
         self.handlers |= driving
 
@@ -79,7 +85,7 @@ class Commands:
         if handler is None:
             have = ", ".join(sorted(self._supervisor.vehicle.methods)) or "none"
             raise Refused(f"this vehicle has no {method}", remedy=f"motions that it has: {have}")
-        if method in self._driving:
+        if method in self._driving and not params.get("dry_run"):
             self._require_set_up()
         return await handler(params, lease)
 

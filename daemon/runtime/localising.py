@@ -9,10 +9,11 @@ from typing import Any, Final, Protocol, runtime_checkable
 
 import msgspec
 
-from canhelm.errors import UsageError
+from canhelm.errors import NotReady, UsageError
 from daemon.loops.articulated import ArticulatedVehicle
 from daemon.loops.localisation import composed, inverted
 from daemon.loops.odometry import Pose
+from daemon.loops.path import wrap
 from daemon.loops.path_driving import VehicleReading
 from daemon.loops.pose_filter import Correction, FilterNoise, PoseFilter, SeenBearing
 from daemon.runtime.events import EventLog
@@ -20,6 +21,8 @@ from daemon.runtime.handlers import Handler, Params
 from daemon.runtime.vehicle import Vehicle
 from profiles.localisation import LocalisationConfig
 
+FIRST_FIX_S: Final = 5.0
+"""How long a path waits for the first fix."""
 STALE_S: Final = 1.0
 """Age of the last scan from which the pose is the odometry's alone."""
 SOURCE: Final = "localisation"
@@ -80,9 +83,25 @@ class Localiser:
         self.handlers: dict[str, Handler] = {"localisation.bearings": self._bearings}
         self._scans = self._used = self._rejected = 0
         self._last_scan_s = -math.inf
+        self._located = asyncio.Event()
+
+    async def located(self) -> None:
+        """Wait until a scan has told where the vehicle is, and the vehicle has taken it over.
+
+        Raises:
+            NotReady: none has within ``FIRST_FIX_S``.
+        """
+        try:
+            await asyncio.wait_for(self._located.wait(), FIRST_FIX_S)
+        except TimeoutError:
+            what = "the vehicle does not know yet where it is: no scan has shown three reflectors"
+            remedy = "see that the scanner runs and sees them; `canhelm status --json` has localisation"
+            raise NotReady(what, remedy=remedy) from None
 
     def step(self) -> None:
         """Once a control cycle: follow the odometry."""
+        if self.filter.covariance is not None:
+            self._located.set()
         pose = self._odometry.pose
         self.filter.move(pose, asyncio.get_running_loop().time(), self._mounting(pose))
 
@@ -134,7 +153,7 @@ class Localiser:
             "state": "waiting" if covariance is None else "odometry" if age_s > STALE_S else "fixed",
             "x_m": round(pose.x_m, 4),
             "y_m": round(pose.y_m, 4),
-            "heading_deg": round(math.degrees(pose.yaw_rad), 3),
+            "heading_deg": round(math.degrees(wrap(pose.yaw_rad)), 3),
             "position_std_m": None if covariance is None else round(covariance.position_m, 4),
             "heading_std_deg": None if covariance is None else round(math.degrees(math.sqrt(covariance.tt)), 3),
             "scan_age_s": round(age_s, 3) if math.isfinite(age_s) else None,

@@ -14,6 +14,7 @@ from daemon.loops.paired_steer import PairedSteerLaw
 from daemon.loops.paired_steer_target import (
     SINGLE_CENTRE_LIMIT_RAD,
     PairedSteerTarget,
+    check_speed,
     check_target,
     direction_target,
     parallel_target,
@@ -109,7 +110,7 @@ class PairedSteerVehicle(Vehicle):
 
         Raises:
             UsageError: the path is empty, or its pieces do not join.
-            LimitExceeded: it cannot be followed closely enough.
+            LimitExceeded: it cannot be followed closely enough, or the speed is beyond the limit.
             Refused: another law than the vehicle's own is asked for.
         """
         if request.law != "cascade":
@@ -117,6 +118,8 @@ class PairedSteerVehicle(Vehicle):
                 f"this robot stops to steer: it does not follow paths by the {request.law} law",
                 remedy="leave --published out",
             )
+        speed = self.limits.speed_m_s if request.speed_m_s is None else request.speed_m_s
+        check_speed(self.limits, speed)
         pose = self.odometry.pose
         path = await build_path(
             request.spec,
@@ -126,7 +129,7 @@ class PairedSteerVehicle(Vehicle):
             backward_curvature=math.inf,
             run_out_m=0.0,
         )
-        plan = PiecesPlan(self, path, min(request.speed_m_s or self.limits.speed_m_s, self.limits.speed_m_s))
+        plan = PiecesPlan(self, path, speed)
         for piece in PiecePlanner(self.geometry, self.limits, path, pose.yaw_rad):
             if piece is not None:
                 plan.add(piece)

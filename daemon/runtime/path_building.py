@@ -37,7 +37,6 @@ class PathBuilder:
         self._curvatures = forward_curvature, backward_curvature
         self._backward = exchanged
         self._path: Path | None = None
-        self._entry_of: list[int] = []
         self._entries = 0
 
     def add(self, spec: PieceSpec) -> None:
@@ -49,14 +48,13 @@ class PathBuilder:
         """
         try:
             for piece in self._pieces(spec):
-                check_piece(len(self._entry_of), piece, *self._curvatures)
-                self._entry_of.append(self._entries)
+                check_piece(self._entries, piece, *self._curvatures)
                 if self._path is None:
                     self._path = Path([piece], self._lead_m)
                 else:
-                    self._path.append(piece)
+                    self._path.append(piece, self._entries)
         except CanhelmError as error:
-            raise self._of_entry(error, self._entries) from None
+            raise _of_entry(error, self._entries) from None
         self._entries += 1
         self._go_to_end()
 
@@ -68,13 +66,8 @@ class PathBuilder:
             check_run_out(self._path, run_out_m)
         except CanhelmError as error:
             number = int((error.object or "piece 0").removeprefix("piece "))
-            raise self._of_entry(error, self._entry_of[number]) from None
+            raise _of_entry(error, number) from None
         return self._path
-
-    def _of_entry(self, error: E, entry: int) -> E:
-        return type(error)(
-            error.message, object=f"pieces[{entry}]", value=error.value, limit=error.limit, remedy=error.remedy
-        )
 
     def _go_to_end(self) -> None:
         assert self._path is not None
@@ -84,7 +77,7 @@ class PathBuilder:
 
     def _pieces(self, spec: PieceSpec) -> Iterable[Piece]:
         if sum(getattr(spec, kind) is not None for kind in _KINDS) != 1:
-            raise UsageError("a piece is none, or more than one, of its kinds", remedy=f"one of {', '.join(_KINDS)}")
+            raise self._no_kind(spec)
         self._turn_round(spec)
         x, y = spec.from_m or (self._x_m, self._y_m)
         direction = self._heading_rad + (math.pi if self._backward else 0.0)
@@ -96,6 +89,10 @@ class PathBuilder:
         if spec.arc_deg is not None:
             return (self._arc(spec, (x, y), direction, math.radians(spec.arc_deg)),)
         return self._through(spec, (x, y))
+
+    def _no_kind(self, spec: PieceSpec) -> UsageError:
+        given = " and ".join(kind for kind in _KINDS if getattr(spec, kind) is not None) or "none of its kinds"
+        return UsageError(f"piece {self._entries} has {given}", remedy=f"give it one of {', '.join(_KINDS)}")
 
     def _turn_round(self, spec: PieceSpec) -> None:
         """Change the driving direction: the reference point is another one then."""
@@ -110,20 +107,35 @@ class PathBuilder:
 
     def _arc(self, spec: PieceSpec, begin: Point, direction: float, turn: float) -> Piece:
         if (spec.radius_m is None) == (spec.centre_m is None):
-            raise UsageError("an arc needs a radius or a centre", remedy="give radius_m or centre_m, not both")
+            raise _half_told_arc(self._entries, spec)
         radius = spec.radius_m
         if radius is None and spec.centre_m is not None:
             out = math.atan2(begin[1] - spec.centre_m[1], begin[0] - spec.centre_m[0])
             radius, direction = math.dist(begin, spec.centre_m), out + math.copysign(math.pi / 2, turn)
         if not radius:
-            raise UsageError("an arc begins at its own centre", remedy="check centre_m")
+            raise UsageError(f"piece {self._entries}: an arc begins at its own centre", remedy="check centre_m")
         return Piece(*begin, direction, radius * abs(turn), math.copysign(1 / radius, turn), self._backward)
 
     def _through(self, spec: PieceSpec, begin: Point) -> list[Piece]:
         if spec.radius_m is None:
-            raise UsageError("waypoints need the radius of their corners", remedy="give radius_m")
+            what = f"piece {self._entries}: waypoints_m without the radius of their corners"
+            raise UsageError(what, remedy="add radius_m to the piece, such as radius_m: 1")
         points = [begin, *(spec.waypoints_m or ())]
         return join_waypoints(points, spec.radius_m, self._backward, self._lead_m).pieces
+
+
+def _of_entry(error: E, entry: int) -> E:
+    where = f"piece {entry}"
+    message = error.message if where in error.message else f"{where}: {error.message}"
+    return type(error)(message, object=f"pieces[{entry}]", value=error.value, limit=error.limit, remedy=error.remedy)
+
+
+def _half_told_arc(entry: int, spec: PieceSpec) -> UsageError:
+    where = f"piece {entry}: arc_deg {spec.arc_deg:g}"
+    if spec.radius_m is None:
+        remedy = "add radius_m or centre_m to the piece, such as radius_m: 1"
+        return UsageError(f"{where} has neither radius_m nor centre_m", remedy=remedy)
+    return UsageError(f"{where} has both radius_m and centre_m", remedy="leave one of them out")
 
 
 async def build_path(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from abc import ABC, abstractmethod
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
@@ -13,7 +14,7 @@ from canhelm.errors import LimitExceeded, Refused, UsageError
 from daemon.runtime.handlers import Handler, Params, holder, run_motion
 from daemon.runtime.motions import Motion
 from daemon.runtime.supervisor import Supervisor
-from profiles.path_file import MAX_PIECES, PathSpec, PieceSpec
+from profiles.path_file import MAX_PIECES, PathSpec, PieceSpec, mistake_of
 
 MAX_KEPT = 2
 """Paths that are kept for clients which send them in parts; one more takes the oldest one's place."""
@@ -45,8 +46,12 @@ class PathPlan(ABC):
         """What would be driven, for ``dry_run``; part of the motion's result, too."""
 
     @abstractmethod
+    def require_begin(self) -> None:
+        """Raise Refused where the vehicle is not at the path's beginning."""
+
+    @abstractmethod
     def motion(self, lease: str | None) -> Motion:
-        """The motion that drives it. Raises Refused where the vehicle is not at its beginning."""
+        """The motion that drives it, from its beginning."""
 
 
 @runtime_checkable
@@ -69,9 +74,13 @@ class PathCommands:
     Args:
         supervisor: what decides.
         vehicle: its vehicle.
+
+    Attributes:
+        located: waits until the vehicle knows where it is, where it has to be told.
     """
 
     def __init__(self, supervisor: Supervisor, vehicle: PathVehicle) -> None:
+        self.located: Callable[[], Awaitable[None]] = _at_once
         self._supervisor, self._vehicle = supervisor, vehicle
         self._kept: dict[str, list[PieceSpec]] = {}
         self._numbers = itertools.count(1)
@@ -104,10 +113,14 @@ class PathCommands:
         kept = params.get("kept")
         if kept is not None:
             spec = msgspec.structs.replace(spec, pieces=[*self._known(kept), *spec.pieces])
-        self._supervisor.require_ready(())
+        dry_run = bool(params.get("dry_run"))
+        if not dry_run:
+            self._supervisor.require_ready(())
+            await self.located()
         backward, law = bool(params.get("backward")), params.get("law", "cascade")
         plan = await self._vehicle.plan_path(PathRequest(spec, backward, params.get("speed_m_s"), law))
-        if params.get("dry_run"):
+        plan.require_begin()
+        if dry_run:
             return plan.summary()
         if self._supervisor.motions:
             raise Refused("the vehicle moves already", remedy="wait for it, or `canhelm stop`")
@@ -116,12 +129,14 @@ class PathCommands:
         return await run_motion(self._supervisor, plan.motion(holder(params, lease)), params)
 
 
+async def _at_once() -> None:
+    """An odometry knows from the beginning where the vehicle is."""
+
+
 def converted(data: Any, kind: type[T]) -> T:
     """What a client sent as an object. Raises UsageError, with the place of the mistake as ``object``."""
     try:
         return msgspec.convert(data, kind)
     except msgspec.ValidationError as error:
-        what, _, place = str(error).partition(" - at `$")
-        where = place.strip("`.")
-        remedy = "docs/paths.md has the keys of a path"
+        where, what, remedy = mistake_of(error)
         raise UsageError(f"{where or 'path'}: {what}", object=where or None, remedy=remedy) from None

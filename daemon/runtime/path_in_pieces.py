@@ -11,7 +11,7 @@ from daemon.loops.odometry import Odometry
 from daemon.loops.paired_steer import PairedSteerLaw
 from daemon.loops.paired_steer_piece import DrivenPiece, aimed, target_of
 from daemon.loops.paired_steer_target import PairedSteerTarget
-from daemon.loops.path import Path
+from daemon.loops.path import Path, wrap
 from daemon.loops.path_in_pieces import distance
 from daemon.runtime.paired_steer_motions import PairedSteerMotion
 from daemon.runtime.path_commands import PathPlan
@@ -58,7 +58,9 @@ class PiecesPlan(PathPlan):
     def add(self, piece: DrivenPiece) -> None:
         """One more piece, in the order of travel."""
         self.pieces.append(piece)
-        self._told.append(_told(piece, target_of(self._robot.geometry, self._robot.limits, piece, self._speed_m_s)))
+        target = target_of(self._robot.geometry, self._robot.limits, piece, self._speed_m_s)
+        entries = [self.way.told(piece.first), self.way.told(piece.last)]
+        self._told.append({"path_pieces": entries, **_told(piece, target)})
 
     def summary(self) -> dict[str, Any]:
         """Number and largest deviation, and each piece with its own."""
@@ -69,17 +71,20 @@ class PiecesPlan(PathPlan):
             "pieces": self._told,
         }
 
-    def motion(self, lease: str | None) -> PathInPieces:
-        """The motion; refused where the robot is not at the path's beginning."""
+    def require_begin(self) -> None:
+        """Raise Refused where the robot is not at the path's beginning."""
         pose, (x, y) = self._robot.odometry.pose, self.way.pieces[0].point(0.0)
         away = math.hypot(pose.x_m - x, pose.y_m - y)
         if away > AT_BEGIN_M:
             raise Refused(
                 f"the path begins {away:.2f} m from the robot",
                 value=round(away, 3),
-                limit=AT_BEGIN_M,
+                limit=f"{AT_BEGIN_M:g} m",
                 remedy="leave start: out of the path file, or drive to its beginning first",
             )
+
+    def motion(self, lease: str | None) -> PathInPieces:
+        """The motion."""
         return PathInPieces(lease, self._robot, self.way, self.pieces, self._speed_m_s, self.summary())
 
 
@@ -89,7 +94,6 @@ def _told(one: DrivenPiece, target: PairedSteerTarget) -> dict[str, Any]:
     bend = one.piece.curvature
     return {
         "kind": "arc" if bend else "line",
-        "path_pieces": [one.first, one.last],
         "length_m": round(one.piece.length_m, 4),
         "radius_m": round(1 / bend, 4) if bend else None,
         "rear_deg": round(math.degrees(target.rear_heading_rad), 2),
@@ -178,7 +182,7 @@ class PathInPieces(PairedSteerMotion):
             "driven_deviation_m": round(max(self.driven_m), 4),
             "x_m": round(pose.x_m, 4),
             "y_m": round(pose.y_m, 4),
-            "heading_deg": round(math.degrees(pose.yaw_rad), 3),
+            "heading_deg": round(math.degrees(wrap(pose.yaw_rad)), 3),
             "error_m": round(math.hypot(pose.x_m - end.x_m, pose.y_m - end.y_m), 4),
             "duration_s": round(now_s - self.begun_s, 3),
             "pieces": told,

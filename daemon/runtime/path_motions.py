@@ -102,12 +102,13 @@ class PathMotion(Motion):
         last, vehicle = self._path.pieces[-1], self._vehicle
         units = vehicle.kinematics.poses(vehicle.reading.truck, vehicle.reading.bending_rad)
         unit = units[-1 if last.backward else 0]
-        turned = wrap(unit.yaw_rad - last.heading(last.length_m))
+        end_m = last.length_m if math.isfinite(last.length_m) else last.project(unit.x_m, unit.y_m)[0]
+        turned = wrap(unit.yaw_rad - last.heading(end_m))
         return {
             "x_m": round(unit.x_m, 4),
             "y_m": round(unit.y_m, 4),
-            "heading_deg": round(math.degrees(unit.yaw_rad), 3),
-            "end_error_m": round(math.dist(last.point(last.length_m), (unit.x_m, unit.y_m)), 4),
+            "heading_deg": round(math.degrees(wrap(unit.yaw_rad)), 3),
+            "end_error_m": round(math.dist(last.point(end_m), (unit.x_m, unit.y_m)), 4),
             "end_heading_error_deg": round(math.degrees(turned), 3),
             "largest_error_m": round(self.largest_error_m, 4),
             "limits_s": {name: round(seconds, 2) for name, seconds in sorted(self.limits_s.items())},
@@ -124,7 +125,7 @@ class PathMotion(Motion):
         return {
             "phase": str(record.phase),
             "section": record.section,
-            "piece": following.meeting.piece,
+            "piece": self._path.told(following.meeting.piece),
             "remaining_m": round(following.remaining_m, 3),
             "error_m": round(errors.position_m, 4),
             "heading_error_deg": round(math.degrees(errors.heading_rad), 2),
@@ -152,13 +153,11 @@ class FollowedPath(PathPlan):
     def summary(self) -> dict[str, Any]:
         """Size of the path, where it begins, and about how long it takes."""
         path, first = self.path, self.path.pieces[0]
-        curvature = max(abs(piece.curvature) for piece in path.pieces)
-        length = math.fsum(piece.length_m for piece in path.pieces)
         return {
             "pieces": len(path.pieces),
             "sections": len(path.sections),
-            "length_m": round(length, 3),
-            "least_radius_m": round(1 / curvature, 3) if curvature else None,
+            "length_m": round(path.length_m, 3),
+            "least_radius_m": round(1 / path.sharpest, 3) if path.sharpest else None,
             "begin": {
                 "x_m": round(first.x_m, 4),
                 "y_m": round(first.y_m, 4),
@@ -168,13 +167,17 @@ class FollowedPath(PathPlan):
             "law": "published" if self._published else "cascade",
         }
 
-    def motion(self, lease: str | None) -> PathMotion:
-        """The motion. Raises Refused where the vehicle is not at the path's beginning."""
+    def require_begin(self) -> None:
+        """Raise Refused where the vehicle is not at the path's beginning."""
         vehicle, reading = self._vehicle, self._vehicle.reading
         reason = at_begin(vehicle.kinematics, self.path, reading.truck, reading.bending_rad)
         if reason:
             remedy = "drive there first, or leave start: out of the path file to begin where the vehicle is"
             raise Refused(f"{KIND}: {reason}", remedy=remedy)
+
+    def motion(self, lease: str | None) -> PathMotion:
+        """The motion."""
+        vehicle = self._vehicle
         rate = math.radians(vehicle.axle.rate_deg_s)
         driver = PathDriver(vehicle.kinematics, self.path, self._speed, rate, self._published)
         return PathMotion(lease, vehicle, self.path, driver)

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from canhelm.errors import LimitExceeded, Refused
 from daemon.loops.articulated import ArticulatedVehicle, Hitch
+from daemon.loops.bending_observer import BendingObserver
 from daemon.loops.measurement import Measurement
 from daemon.loops.odometry import Pose
 from daemon.loops.path_driving import VehicleReading
@@ -74,14 +75,21 @@ class SemitrailerVehicle(SteeredVehicle):
         self.names: tuple[str, ...] = (drive.name, steering.name)
         self.odometry = TruckOdometry(geometry.wheelbase_m)
         self.reading = VehicleReading(Pose(), (0.0,), 0.0, 0.0)
+        self._bending = BendingObserver(hitches[0])
+        self._travel_m: float | None = None
+        self._measured_s = 0.0
 
     # --- measuring ---------------------------------------------------------------------------------------------
 
     def measure(self, now_s: float) -> Measurement:
         """The newest readings, and where the truck is by them."""
         measurement = self._readings(now_s)
-        steering, bending = measurement.heading_rad
-        truck = self.odometry.update(measurement.wheel_travel_m[0], steering)
+        steering, sensed = measurement.heading_rad
+        travel, last = measurement.wheel_travel_m[0], self._travel_m
+        way = 0.0 if last is None else travel - last
+        bending = self._bending.update(sensed, way, self.kinematics.curvature(steering), now_s - self._measured_s)
+        self._travel_m, self._measured_s = travel, now_s
+        truck = self.odometry.update(travel, steering)
         self.reading = VehicleReading(truck, (bending,), steering, measurement.wheel_speed_m_s[0])
         return measurement
 

@@ -310,3 +310,15 @@ def test_a_person_calibrates_a_simulated_sensor_at_a_terminal(tmp_path: Path) ->
     assert calibration is not None
     for true in (-25.0, 0.0, 25.0):
         assert on_the_way(calibration, DEFECTS, true) == pytest.approx(true, abs=0.2)
+
+
+@pytest.mark.parametrize("data", [None, b"\x89PNG\xff\xfe"])
+def test_readings_that_cannot_be_read_are_told_without_a_number_of_the_system(
+    data: bytes | None, tmp_path: Path
+) -> None:
+    path = tmp_path / "nope.csv"
+    if data is not None:
+        path.write_bytes(data)
+    with pytest.raises(UsageError, match=r"nope\.csv") as caught:
+        read_readings(path)
+    assert "Errno" not in caught.value.message

@@ -132,3 +132,13 @@ def test_a_limit_that_the_sentence_tells_is_not_told_twice(capsys: pytest.Captur
 @pytest.mark.parametrize(("text", "value"), [("0x10", 16), ("-20", -20), ("1.5", 1.5), ("save", "save")])
 def test_a_value_to_write_is_a_number_where_it_is_one(text: str, value: float | str) -> None:
     assert value_of(text) == value
+
+
+def test_a_list_of_objects_has_a_line_each_for_people(capsys: pytest.CaptureFixture[str]) -> None:
+    show({"stops": 1, "pieces": [{"kind": "line", "length_m": 0.5}, {"kind": "arc", "length_m": 1.0}]}, json=False)
+    assert capsys.readouterr().out.splitlines() == [
+        "stops: 1",
+        "pieces:",
+        "  0: kind line, length_m 0.5",
+        "  1: kind arc, length_m 1",
+    ]

@@ -106,3 +106,29 @@ def test_what_is_no_record_is_refused(text: str, tmp_path: Path, capsys: pytest.
 
 def test_a_tolerance_that_makes_no_sense_is_refused(tmp_path: Path) -> None:
     assert main(["drive", "fit", str(tmp_path / "a"), str(tmp_path / "b"), "--tolerance", "0"]) == 2
+
+
+@pytest.mark.parametrize("data", [b"\x89PNG\xff\xfe", b"a" * 200_000, b"0,0,0\x00,0\n"])
+def test_a_file_that_is_no_text_is_no_record(data: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    record = tmp_path / "way.csv"
+    record.write_bytes(data)
+    assert main(["drive", "fit", str(record), str(tmp_path / "way.yaml")]) == 2
+    assert str(record) in capsys.readouterr().err
+
+
+def test_fitting_overwrites_no_path_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    record, kept = tmp_path / "way.csv", tmp_path / "way.yaml"
+    record.write_text("\n".join(f"0,{step * 0.02},0,0,,," for step in range(50)))
+    kept.write_text("mine")
+    assert main(["drive", "fit", str(record), str(kept)]) == 2
+    assert f"{kept} exists already" in capsys.readouterr().err
+    assert kept.read_text() == "mine"
+
+
+@pytest.mark.real_time
+def test_recording_overwrites_no_record(bench: Bench, tmp_path: Path) -> None:
+    kept = tmp_path / "way.csv"
+    kept.write_text("mine")
+    done = bench.canhelm("drive", "record", str(kept), "--duration", "0.1")
+    assert (done.returncode, kept.read_text()) == (2, "mine")
+    assert "exists already" in done.stderr

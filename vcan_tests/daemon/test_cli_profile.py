@@ -99,3 +99,13 @@ def test_a_new_profile_needs_a_proper_name() -> None:
 
 def test_a_new_profile_extends_only_what_there_is() -> None:
     assert main(["profile", "new", "lab1", "--extends", "max3d"]) == 7
+
+
+@pytest.mark.parametrize("base", ["max2d", "turtle", "semitrailer", "ackermann", "nxt"])
+def test_the_sample_lines_of_a_new_profile_name_what_its_base_has(base: str, tmp_path: Path) -> None:
+    path = tmp_path / "lab1.yaml"
+    main(["profile", "new", "lab1", "--extends", base, "--out", str(path)])
+    _, *lines = path.read_text().splitlines()
+    path.write_text("\n".join(line.removeprefix("# ") for line in lines))
+    assert "# limits:" in lines
+    assert load(path).profile.limits == load(base).profile.limits

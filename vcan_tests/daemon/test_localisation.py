@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from canhelm.errors import ConfigError, UsageError
+from canhelm.errors import ConfigError, NotReady, UsageError
 from daemon.loops.localisation import composed
 from daemon.loops.odometry import Pose
 from drivers.simulated.semitrailer import SemitrailerWorld
@@ -46,6 +46,25 @@ async def test_a_vehicle_knows_its_place_after_the_first_scan() -> None:
         await asyncio.sleep(0.5)
         assert robot.app.service.status()["localisation"]["state"] == "fixed"
         assert error_m(robot) < 0.02
+
+
+async def test_a_path_waits_for_the_first_fix() -> None:
+    line = {"pieces": [{"line_m": 1.0}]}
+    async with running_robot(lab(rate_hz=0.5), booted=False, powered=False) as robot:
+        world = robot.network.world
+        assert isinstance(world, SemitrailerWorld)
+        world.place((0.5, -0.4, 0.6), 0.0, 0.0)
+        robot.network.power_on("all")
+        await robot.until(lambda: robot.state == "idle")
+        assert robot.app.service.status()["localisation"]["state"] == "waiting"
+        result = await robot.call("drive.path", path=line)
+        assert (result["x_m"], result["y_m"]) == pytest.approx((0.5 + math.cos(0.6), -0.4 + math.sin(0.6)), abs=0.03)
+
+
+async def test_a_path_is_refused_where_no_scan_ever_tells_the_place() -> None:
+    async with running_robot(lab()) as robot:
+        with pytest.raises(NotReady, match="no scan has shown three reflectors"):
+            await robot.call("drive.path", path={"pieces": [{"line_m": 1.0}]})
 
 
 async def test_a_scanner_on_the_trailer_keeps_the_truck_in_place_while_it_drives() -> None:

@@ -108,7 +108,7 @@ def test_gentle_curves_have_no_warning() -> None:
 
 def test_sharp_curves_are_warned_of() -> None:
     (warning,) = turning_warnings(GEOMETRY, solve_turning(GEOMETRY, -0.5, 0.5, 1))
-    assert "0.45 rad" in warning
+    assert "beyond 26 deg" in warning
 
 
 def test_a_centre_inside_the_track_is_warned_of() -> None:

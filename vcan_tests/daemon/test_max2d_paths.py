@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from canhelm.errors import Refused, UsageError
+from canhelm.errors import LimitExceeded, Refused, UsageError
 from daemon.runtime.path_in_pieces import PathInPieces
 from vcan_tests.robot import Robot, running_robot
 
@@ -101,3 +101,24 @@ async def test_a_stop_on_the_way_ends_the_path() -> None:
             await driving
         assert pose_of(robot)[0] < 1.3
         assert robot.state == "idle"
+
+
+async def test_a_speed_beyond_the_limit_is_refused_and_not_capped() -> None:
+    async with running_robot() as robot:
+        with pytest.raises(LimitExceeded, match=r"9 m/s is beyond the vehicle's limit") as caught:
+            await follow(robot, BEND, speed_m_s=9.0, dry_run=True)
+        assert caught.value.limit == f"speed_m_s {robot.app.profile.limits.speed_m_s:g}"
+
+
+async def test_a_dry_run_refuses_a_beginning_that_a_drive_would_refuse() -> None:
+    async with running_robot() as robot:
+        with pytest.raises(Refused, match=r"begins 0\.10 m from the robot"):
+            await follow(robot, BEND, start={"x_m": 0.1}, dry_run=True)
+
+
+async def test_pieces_are_told_by_the_numbers_of_the_file() -> None:
+    async with running_robot() as robot:
+        way: list[dict[str, Any]] = [{"waypoints_m": [[1, 0], [1, 1]], "radius_m": 0.8}, {"line_m": 0.5}]
+        told = await follow(robot, way, dry_run=True)
+        assert told["pieces"][0]["path_pieces"][0] == 0
+        assert told["pieces"][-1]["path_pieces"][1] == 1

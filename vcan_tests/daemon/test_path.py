@@ -134,9 +134,11 @@ def test_forwards_again_begins_at_the_trucks_axle() -> None:
 
 
 def test_legs_too_short_for_their_corners_are_named() -> None:
-    with pytest.raises(LimitExceeded, match=r"leg to waypoint 1 is 2\.000 m long, its ends need 2\.500 m") as caught:
+    with pytest.raises(
+        LimitExceeded, match=r"leg to waypoint \[2, 0\] is 2\.000 m long, its ends need 2\.500 m"
+    ) as caught:
         join_waypoints(CORNER, 2.5)
-    assert caught.value.object == "waypoint 1"
+    assert caught.value.object == "waypoint [2, 0]"
 
 
 def test_corners_that_just_fit_leave_no_line_between_them() -> None:
@@ -145,7 +147,7 @@ def test_corners_that_just_fit_leave_no_line_between_them() -> None:
 
 
 def test_the_same_waypoint_twice_is_refused() -> None:
-    with pytest.raises(UsageError, match="waypoint 1 is where the one before it is"):
+    with pytest.raises(UsageError, match=r"waypoint \[0, 0\] is where the one before it is"):
         join_waypoints([(0, 0), (0, 0)], 1.0)
 
 

@@ -106,6 +106,44 @@ async def test_a_radius_that_is_too_small_is_named_with_its_entry_of_the_file() 
     error = await refused(through, PieceSpec(arc_deg=9.0, radius_m=0.3))
     assert isinstance(error, LimitExceeded)
     assert error.object == "pieces[1]"
+    assert error.message.startswith("piece 1 has a radius of 0.300 m")
+
+
+async def test_a_joint_after_waypoints_is_told_by_the_numbers_of_the_file() -> None:
+    through = PieceSpec(waypoints_m=[(1.0, 5.0), (4.0, 5.0)], radius_m=1.0)
+    error = await refused(through, PieceSpec(line_m=1.0, from_m=(4.0, 5.1)))
+    assert error.message.startswith("piece 1 begins 0.100 m beside the end of piece 0")
+
+
+async def test_a_leg_that_is_too_short_is_told_with_its_entry_and_its_waypoint() -> None:
+    through = PieceSpec(waypoints_m=[(1.0, 4.0), (4.0, 4.0)], radius_m=1.5)
+    error = await refused(PieceSpec(line_m=1.0), through)
+    assert error.object == "pieces[1]"
+    assert error.message.startswith("piece 1: the leg to waypoint [1, 4] is 1.000 m long")
+
+
+async def test_limits_of_angles_are_told_in_degrees() -> None:
+    error = await refused(PieceSpec(line_m=1.0), PieceSpec(line_to_m=(3.0, 5.0)))
+    assert (error.limit, error.value) == ("kink_deg 0.5", 45.0)
+
+
+async def test_a_line_of_a_million_kilometres_is_refused() -> None:
+    error = await refused(PieceSpec(line_m=1e9))
+    assert (error.object, error.limit) == ("pieces[0]", "length_m 10000")
+
+
+@pytest.mark.parametrize(
+    ("piece", "told"),
+    [
+        (PieceSpec(arc_deg=90.0), "piece 0: arc_deg 90 has neither radius_m nor centre_m"),
+        (PieceSpec(arc_deg=90.0, radius_m=1.0, centre_m=(0.0, 0.0)), "piece 0: arc_deg 90 has both radius_m and"),
+        (PieceSpec(waypoints_m=[(0.0, 5.0)]), "piece 0: waypoints_m without the radius of their corners"),
+        (PieceSpec(line_m=1.0, arc_deg=90.0), "piece 0 has line_m and arc_deg"),
+        (PieceSpec(), "piece 0 has none of its kinds"),
+    ],
+)
+async def test_a_piece_that_is_half_told_says_what_is_missing(piece: PieceSpec, told: str) -> None:
+    assert (await refused(piece)).message.startswith(told)
 
 
 async def test_a_section_that_is_too_short_is_named_with_its_last_piece() -> None:

@@ -9,9 +9,11 @@ from typing import Any
 import msgspec
 import pytest
 
-from canhelm.errors import LimitExceeded, Refused, UsageError
+from canhelm.errors import EmergencyStop, LimitExceeded, Refused, UsageError
 from daemon.loops.odometry import Pose
-from daemon.runtime.path_motions import PathMotion
+from daemon.loops.path import Path, Piece
+from daemon.loops.path_speed import SpeedTuning
+from daemon.runtime.path_motions import FollowedPath, PathMotion
 from daemon.runtime.semitrailer_vehicle import SemitrailerVehicle
 from drivers.simulated.semitrailer import SemitrailerWorld
 from profiles.loader import load
@@ -117,6 +119,32 @@ async def test_a_path_that_begins_elsewhere_is_refused() -> None:
     async with running_robot(PROFILE) as robot:
         with pytest.raises(Refused, match=r"begins 2\.00 m away"):
             await robot.call("drive.path", path={"start": {"x_m": 2}, "pieces": [{"line_m": 1}]})
+
+
+async def test_a_dry_run_refuses_a_beginning_that_a_drive_would_refuse() -> None:
+    async with running_robot(PROFILE) as robot:
+        with pytest.raises(Refused, match=r"begins 2\.00 m away"):
+            await robot.call("drive.path", path={"start": {"x_m": 2}, "pieces": [{"line_m": 1}]}, dry_run=True)
+
+
+async def test_a_dry_run_needs_no_healthy_robot() -> None:
+    async with running_robot(PROFILE, expect_errors=True) as robot:
+        robot.app.supervisor.estop("pressed")
+        told = await robot.call("drive.path", path=shipped("line"), dry_run=True)
+        assert told["pieces"] == 1
+        with pytest.raises(EmergencyStop):
+            await robot.call("drive.path", path=shipped("line"))
+
+
+async def test_an_endless_circle_has_an_end_error_of_none_when_it_is_stopped() -> None:
+    async with running_robot(PROFILE) as robot:
+        vehicle, circle = vehicle_of(robot), Path([Piece(0.0, 0.0, 0.0, math.inf, 0.8)])
+        motion = FollowedPath(vehicle, circle, SpeedTuning(0.3, 0.3, 0.3), published=False).motion(None)
+        robot.app.supervisor.admit(motion)
+        await robot.until(lambda: world_of(robot).pose[1] > 0.2)
+        motion.stop("enough")
+        await motion.closed.wait()
+        assert motion.progress()["error_m"] == pytest.approx(0.0, abs=0.02)
 
 
 async def test_a_speed_beyond_the_limit_is_refused() -> None:

@@ -71,6 +71,15 @@ def test_an_empty_path_is_refused(tmp_path: Path, text: str) -> None:
     assert refusal(tmp_path, text).startswith("1: ")
 
 
+def test_a_file_that_is_a_list_is_not_called_empty(tmp_path: Path) -> None:
+    assert refusal(tmp_path, "- {line_m: 1}\n") == "1: is a list, not a mapping (write pieces: above it, and indent it)"
+
+
+def test_a_driving_direction_that_is_none_is_told_with_those_that_are(tmp_path: Path) -> None:
+    told = refusal(tmp_path, "pieces: [{line_m: 1, drive: sideways}]")
+    assert told == "1: pieces[0].drive: is 'sideways' (write forward or backward)"
+
+
 @pytest.mark.parametrize("text", ["a: &a [*a]\npieces: []", "pieces: [" * 50 + "]" * 50, "pieces: [\t", "a: b: c"])
 def test_broken_yaml_is_a_mistake_like_others(tmp_path: Path, text: str) -> None:
     assert refusal(tmp_path, text)[0].isdigit()

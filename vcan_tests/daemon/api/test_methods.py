@@ -45,7 +45,12 @@ def test_what_is_no_finite_number_is_refused(speed: Any) -> None:
 
 
 def test_a_value_out_of_range_is_refused_with_the_range() -> None:
-    assert refusal("drive.set", direction_deg=0, speed_m_s=0.1, valid_for_ms=5000).limit == "20 .. 1000 ms"
+    assert refusal("drive.set", direction_deg=0, speed_m_s=0.1, valid_for_ms=5000).limit == "20 to 1000 ms"
+
+
+def test_a_range_without_an_upper_end_is_told_by_its_lower_one() -> None:
+    error = refusal("drive.path", path={}, speed_m_s=-1)
+    assert (error.limit, error.remedy) == ("at least 0.001 m/s", "give at least 0.001 m/s")
 
 
 def test_an_unknown_parameter_is_refused_with_those_that_there_are() -> None:
