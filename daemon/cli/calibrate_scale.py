@@ -52,7 +52,12 @@ def _calibrate(measure: Measure, options: Options) -> int:
 
 
 async def _measured(measure: Measure, person: Terminal, options: Options) -> None:
+    from daemon.commissioning.session import changes_of
+
     async with Client(options.socket, options.robot) as daemon:
         loaded = own_profile(await daemon.status())
         values = await measure(daemon, person, loaded.profile)
-    await write_changes(loaded, values, person)
+    if any(new != old for old, new in changes_of(loaded.profile, values).values()):
+        await write_changes(loaded, values, person)
+    else:
+        say("the profile fits: nothing has to be written")

@@ -46,7 +46,7 @@ async def _setup(what: str, current_ma: int, person: Terminal, options: Options)
         loaded = own_profile(await daemon.status())
         findings = await commission(daemon, person, loaded.profile, what, current_ma)
     changes = changes_of(loaded.profile, findings.values)
-    show(_result(findings, changes), json=options.json)
+    show(_result(findings, changes), _told, options.json)
     if findings.unsolved:
         for sentence in findings.unsolved:
             say_warning(f"to be mended: {sentence}")
@@ -63,6 +63,11 @@ def _result(findings: Findings, changes: dict[str, tuple[Any, Any]]) -> dict[str
         "unsolved": findings.unsolved,
         "changes": {name: {"was": old, "new": new} for name, (old, new) in changes.items()},
     }
+
+
+def _told(result: dict[str, Any]) -> str:
+    """What was found, for a terminal; changes and what is to be mended are told by themselves."""
+    return "\n".join(result["wrong"]) or "nothing is wired otherwise than the profile says"
 
 
 async def write_changes(loaded: LoadedProfile, values: Values, person: Terminal) -> None:

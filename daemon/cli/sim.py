@@ -63,7 +63,7 @@ def hand(name: str, angle: float, /, *, options: Options = DEFAULT) -> None:
 
 @app.command
 def look(*, options: Options = DEFAULT) -> None:
-    """What a person sees of the simulated robot: wheels, headings, brakes.
+    """What a person sees of the simulated robot: where it stands, wheels, headings, brakes.
 
     Example: `canhelm sim look`
     """

@@ -72,10 +72,12 @@ class Workshop:
         return degrees(world.heading_rad(name) - before)
 
     def look(self) -> dict[str, Any]:
-        """What can be seen: wheels' angles, headings of the pairs, positions of the brakes."""
+        """What can be seen: where the robot stands, wheels' angles, headings of the pairs, positions of the brakes."""
         self._now()
         world = self._network.world
+        x_m, y_m, yaw_rad = world.pose
         return {
+            "stands": {"x_m": round(x_m, 3), "y_m": round(y_m, 3), "yaw_deg": round(degrees(yaw_rad), 2)},
             "lifted": world.lifted,
             "wheel_deg": {name: round(degrees(world.wheel_rad(name)), 2) for name in world.axes},
             "heading_deg": {name: round(degrees(world.heading_rad(name)), 2) for name in self._pairs},
