@@ -192,6 +192,29 @@ def path(
 
 
 @app.command
+def joystick(
+    *,
+    pads: Annotated[bool, Parameter(name="--list", negative=())] = False,
+    pad: str | None = None,
+    options: Options = DEFAULT,
+) -> int:
+    """Drive with a gamepad that is plugged into this machine, until Ctrl-C; the dead-man button is held meanwhile.
+
+    Example: `canhelm drive joystick --list`
+
+    Parameters
+    ----------
+    pads: bool
+        Only show which gamepads there are, and whether they can be read; needs no daemon.
+    pad: str
+        Name or path of the gamepad; the first one where left out.
+    """
+    from daemon.cli.joystick import drive_joystick, show_pads
+
+    return show_pads(options.json) if pads else drive_joystick(pad, options)
+
+
+@app.command
 def record(file: str, /, *, duration: float | None = None, rate: float = 10.0, options: Options = DEFAULT) -> int:
     """Record where the vehicle goes, whoever drives it, until Ctrl-C; `canhelm drive fit` makes a path of it.
 

@@ -30,7 +30,6 @@ class GamepadCommands:
         ranges = vehicle.sticks()
         if not ranges:
             raise Refused("no gamepad drives this vehicle", remedy="`canhelm motor velocity` turns one motor")
-        limits = vehicle.profile.limits
         return {
             "sticks": {command: told for command in ranges if (told := _stick(config, command, ranges[command]))},
             "buttons": {
@@ -40,7 +39,7 @@ class GamepadCommands:
             },
             "taken_at_rest": ["direction", "steering"] if vehicle.steers_at_rest else [],
             "silence_s": config.silence_s,
-            "rest_s": round(limits.speed_m_s / limits.acceleration_m_s2 + REST_S, 2),
+            "rest_s": round(vehicle.ramp_s() + REST_S, 2),
         }
 
 

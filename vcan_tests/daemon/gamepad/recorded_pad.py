@@ -1,0 +1,68 @@
+"""A gamepad as its event device tells of it: a pad in somebody's hands, event by event."""
+
+from __future__ import annotations
+
+import copy
+
+from daemon.gamepad.input_events import (
+    EV_ABS,
+    EV_KEY,
+    EV_SYN,
+    SYN_REPORT,
+    Event,
+    make_event,
+)
+from daemon.gamepad.pad import Pad, Snapshot
+from profiles.gamepad_codes import AXES, BUTTONS
+
+STICKS = ("ABS_X", "ABS_Y", "ABS_RX", "ABS_RY")
+FULL = 32767
+REPORT = make_event(Event(EV_SYN, SYN_REPORT, 0))
+
+
+class RecordedPad:
+    """A pad with two sticks of -32768 to 32767, as the kernel's xpad driver makes them.
+
+    Attributes:
+        pad: what reads it.
+        truth: how it is held, whatever was told of it.
+    """
+
+    def __init__(self, name: str = "Recorded Pad", pressed: tuple[str, ...] = ()) -> None:
+        codes = [AXES[stick] for stick in STICKS]
+        self.truth = Snapshot(
+            dict.fromkeys(codes, 0), dict.fromkeys(codes, (-FULL - 1, FULL)), {BUTTONS[button] for button in pressed}
+        )
+        self.pad = Pad(name, self.look)
+
+    def look(self) -> Snapshot:
+        """What the kernel would answer."""
+        return copy.deepcopy(self.truth)
+
+    def moves(self, axis: str, share: float) -> bytes:
+        """Move a stick to a share of its way; the events."""
+        raw = round(share * FULL)
+        self.truth.axes[AXES[axis]] = raw
+        return make_event(Event(EV_ABS, AXES[axis], raw)) + REPORT
+
+    def presses(self, button: str) -> bytes:
+        """Press a button; the events."""
+        self.truth.pressed.add(BUTTONS[button])
+        return make_event(Event(EV_KEY, BUTTONS[button], 1)) + REPORT
+
+    def lets_go(self, button: str) -> bytes:
+        """Let go of a button; the events."""
+        self.truth.pressed.discard(BUTTONS[button])
+        return make_event(Event(EV_KEY, BUTTONS[button], 0)) + REPORT
+
+    def move(self, axis: str, share: float) -> None:
+        """Move a stick, and let the pad read it."""
+        self.pad.feed(self.moves(axis, share))
+
+    def press(self, button: str) -> None:
+        """Press a button, and let the pad read it."""
+        self.pad.feed(self.presses(button))
+
+    def let_go(self, button: str) -> None:
+        """Let go of a button, and let the pad read it."""
+        self.pad.feed(self.lets_go(button))
