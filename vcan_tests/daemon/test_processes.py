@@ -267,15 +267,6 @@ def test_a_drive_that_loses_power_stops_the_robot_and_one_reset_recovers(rested:
     assert again.returncode == 0
 
 
-def test_the_example_program_drives_its_figure(rested: Bench) -> None:
-    example = Path(__file__).parents[2] / "examples" / "rhombus.py"
-    program = subprocess.run(
-        [sys.executable, str(example)], capture_output=True, text=True, timeout=TIMEOUT_S, env=rested.environment()
-    )
-    assert program.returncode == 0, program.stderr
-    assert len(program.stdout.splitlines()) == 4
-
-
 def test_without_a_daemon_the_exit_code_is_three(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "daemon", "status", "--socket", str(tmp_path / "none.sock")]
     alone = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S)

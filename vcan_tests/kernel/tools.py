@@ -7,7 +7,6 @@ import shutil
 import subprocess
 
 from vcan_tests.kernel.errors import MissingTool
-from vcan_tests.kernel.registers import needs_wide_registers
 
 PACKAGE_OF = {
     "candump": "can-utils",
@@ -15,6 +14,7 @@ PACKAGE_OF = {
     "halt": "systemd-sysv",
     "insmod": "kmod",
     "ip": "iproute2",
+    "socat": "socat",
     "tshark": "tshark",
 }
 
@@ -41,7 +41,7 @@ def missing_packages() -> list[str]:
     """The Debian packages of the tools that are not there."""
     places = os.environ.get("PATH", "") + ":/usr/sbin:/sbin"
     missing = {package for tool, package in PACKAGE_OF.items() if shutil.which(tool, path=places) is None}
-    if needs_wide_registers() and shutil.which("cc") is None:
+    if shutil.which("cc") is None:
         missing |= {"gcc", "libc6-dev"}
     return sorted(missing)
 
