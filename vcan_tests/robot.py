@@ -31,7 +31,7 @@ class Robot:
         self.lease: str | None = None
         self._renewing: asyncio.Task[None] | None = None
 
-    async def call(self, method: str, **params: Any) -> dict[str, Any]:
+    async def call(self, method: str, /, **params: Any) -> dict[str, Any]:
         """One method of the API, with a lease that is kept alive."""
         if self.lease is None:
             self.lease = self.app.service.open_lease("test")

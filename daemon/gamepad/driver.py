@@ -160,7 +160,7 @@ class PadDriver:
         with suppress(Refused):  # it is over already
             await self._client.call("motion.stop", motion=motion)
         await _ending(ended)
-        self._say(f"at rest; hold {self._mapping.buttons.dead_man} to drive")
+        self._say("at rest")
 
     async def _stop(self, method: str, **params: Any) -> None:
         await self._client.call(method, **params)
