@@ -152,7 +152,7 @@ class GoalGuide:
         self._plan, self._case = step.plan, step.case
         self._now += dt
         return Guidance(
-            step.next, step.acceleration_m_s2, step.result, step.case, step.limits, step.eta_s,
+            step.next, step.acceleration_m_s2, step.result, step.case, step.plan.limits, step.eta_s,
             grip.factor, grip.slip, grip.correction,
         )  # fmt: skip
 

@@ -10,16 +10,16 @@ another loop. `follow` therefore keeps the plan within a tolerance; do not plan 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final
+from typing import Final, NamedTuple
 
 from daemon.loops import planner_axis, planner_way
 from daemon.loops.planner_axis import AxisPlan
 from daemon.loops.planner_way import Way
 
 FARTHEST: Final = 1e5
-"""Largest place, heading and speed that is planned with [SI]."""
+"""Largest place, heading and speed that is planned with, and root of the sum of their squares [SI]."""
 LATEST_S: Final = 1e9
 """Latest time that is planned with."""
 LIMIT_RANGE: Final = (1e-3, 1e3)
@@ -86,8 +86,7 @@ class Tolerance:
     rate_rad_s: float = 0.1
 
 
-@dataclass(frozen=True, slots=True)
-class Plan:
+class Plan(NamedTuple):
     """A motion from a state to a goal.
 
     Attributes:
@@ -106,9 +105,15 @@ class Plan:
     start: PlanarState
     goal: PlanarState
     allowed: PlanarLimits
-    limits: PlanarLimits
     way: Way
     turn: AxisPlan
+
+    @property
+    def limits(self) -> PlanarLimits:
+        """In force; accelerations are lower where place or heading waits for the other."""
+        allowed = self.allowed
+        strongest = max((abs(acceleration) for duration, acceleration in self.turn.pieces if duration), default=0.0)
+        return PlanarLimits(allowed.speed, self.way.acceleration, allowed.rate, strongest)
 
     @property
     def ends(self) -> float:
@@ -118,14 +123,15 @@ class Plan:
     def at(self, now: float) -> PlanarState:
         """The state planned for a time [s]; after the end the goal's velocity is held."""
         time = max(0.0, now - self.began)
-        dx, dy, vx, vy = self.way.at(time)
+        way, velocity = self.way.at(time)
         turned, rate = self.turn.at(time)
         start = self.start
-        return PlanarState(start.x + dx, start.y + dy, start.heading + turned, vx, vy, rate)
+        return PlanarState(
+            start.x + way.real, start.y + way.imag, start.heading + turned, velocity.real, velocity.imag, rate
+        )
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
+class Step(NamedTuple):
     """What to do for the next cycle, and why.
 
     Attributes:
@@ -135,8 +141,7 @@ class Step:
         angular_acceleration_rad_s2: to apply over the cycle.
         next: state planned for the end of the cycle.
         eta_s: time left.
-        limits: in force.
-        plan: that was followed: the given one, or a new one if the body was off its plan.
+        plan: that was followed, with the limits in force: the given one, or a new one if the body was off its plan.
     """
 
     result: Result
@@ -145,7 +150,6 @@ class Step:
     angular_acceleration_rad_s2: float
     next: PlanarState
     eta_s: float
-    limits: PlanarLimits
     plan: Plan
 
 
@@ -162,9 +166,7 @@ def plan_motion(start: PlanarState, goal: PlanarState, limits: PlanarLimits, now
         return _nothing(goal, limits)
     fast = math.hypot(goal.vx, goal.vy) > limits.speed * (1 + ROUNDING) or abs(goal.rate) > limits.rate * (1 + ROUNDING)
     way, turn = _to_rest(start, limits) if fast else _together(start, goal, limits)
-    strongest = max((abs(acceleration) for duration, acceleration in turn.pieces if duration), default=0.0)
-    in_force = replace(limits, acceleration=way.acceleration, angular_acceleration=strongest)
-    return Plan(Result.GOAL_TOO_FAST if fast else Result.MOVING, now, start, goal, limits, in_force, way, turn)
+    return Plan(Result.GOAL_TOO_FAST if fast else Result.MOVING, now, start, goal, limits, way, turn)
 
 
 def follow(
@@ -202,7 +204,6 @@ def follow(
         max(-angular, min(angular, (there.rate - here.rate) / dt)),
         there,
         max(0.0, plan.ends - now),
-        plan.limits,
         plan,
     )
 
@@ -210,30 +211,27 @@ def follow(
 def _plannable(start: PlanarState, goal: PlanarState, limits: PlanarLimits, now: float) -> bool:
     low, high = LIMIT_RANGE
     return (
-        all(abs(number) <= FARTHEST for number in (*_numbers(start), *_numbers(goal)))
-        and all(
-            low <= limit <= high
-            for limit in (limits.speed, limits.acceleration, limits.rate, limits.angular_acceleration)
-        )
+        math.hypot(start.x, start.y, start.heading, start.vx, start.vy, start.rate) <= FARTHEST
+        and math.hypot(goal.x, goal.y, goal.heading, goal.vx, goal.vy, goal.rate) <= FARTHEST
+        and low <= limits.speed <= high
+        and low <= limits.acceleration <= high
+        and low <= limits.rate <= high
+        and low <= limits.angular_acceleration <= high
         and abs(now) <= LATEST_S
     )
 
 
-def _numbers(state: PlanarState) -> tuple[float, ...]:
-    return state.x, state.y, state.heading, state.vx, state.vy, state.rate
-
-
 def _nothing(goal: PlanarState, limits: PlanarLimits) -> Plan:
-    way = planner_way.braking((0.0, 0.0), 1.0, 1.0)
-    return Plan(Result.INVALID, 0.0, PlanarState(), goal, limits, limits, way, AxisPlan(0.0, ()))
+    way = planner_way.braking(0j, 1.0, 1.0)
+    return Plan(Result.INVALID, 0.0, PlanarState(), goal, limits, way, AxisPlan(0.0, ()))
 
 
 def _idle(plan: Plan) -> Step:
-    return Step(plan.result, "none", (0.0, 0.0), 0.0, plan.start, 0.0, plan.limits, plan)
+    return Step(plan.result, "none", (0.0, 0.0), 0.0, plan.start, 0.0, plan)
 
 
 def _to_rest(start: PlanarState, limits: PlanarLimits) -> tuple[Way, AxisPlan]:
-    way = planner_way.braking((start.vx, start.vy), limits.speed, limits.acceleration)
+    way = planner_way.braking(complex(start.vx, start.vy), limits.speed, limits.acceleration)
     return way, planner_axis.braking(start.rate, limits.angular_acceleration)
 
 
@@ -243,13 +241,15 @@ def _together(start: PlanarState, goal: PlanarState, limits: PlanarLimits) -> tu
     Not every duration is possible for a turn that begins and ends moving; one with a rest in it can take any
     duration from its shortest on.
     """
-    travel = _plain(goal.x - start.x), _plain(goal.y - start.y)
-    begin, end = (_plain(start.vx), _plain(start.vy)), (_plain(goal.vx), _plain(goal.vy))
+    travel = _vector(goal.x - start.x, goal.y - start.y)
+    begin, end = _vector(start.vx, start.vy), _vector(goal.vx, goal.vy)
     angle = math.remainder(goal.heading - start.heading, math.tau)
     turn = _plain(angle), _plain(start.rate), _plain(goal.rate)
     turn_limits = limits.rate, limits.angular_acceleration
     fastest = planner_way.fastest(travel, begin, end, limits.speed, limits.acceleration, NEAR_M)
-    shortest = planner_axis.fastest(*turn, *turn_limits).duration
+    if not any(turn):
+        return fastest, AxisPlan(0.0, ((fastest.duration, 0.0),))
+    shortest = planner_axis.least_duration(*turn, *turn_limits)
     way = planner_way.lasting(fastest, travel, begin, end, shortest)
     matched = planner_axis.in_time(*turn, *turn_limits, way.duration)
     if matched is None:
@@ -257,6 +257,10 @@ def _together(start: PlanarState, goal: PlanarState, limits: PlanarLimits) -> tu
         way = planner_way.lasting(fastest, travel, begin, end, rested.duration)
         matched = planner_axis.with_a_rest(*turn, *turn_limits, way.duration)
     return way, matched
+
+
+def _vector(x: float, y: float) -> complex:
+    return complex(0.0 if abs(x) < NOTHING else x, 0.0 if abs(y) < NOTHING else y)
 
 
 def _plain(number: float) -> float:
@@ -275,7 +279,7 @@ def _near(planned: PlanarState, state: PlanarState, tolerance: Tolerance) -> boo
 def _result(plan: Plan, here: PlanarState, now: float) -> Result:
     if plan.result is not Result.MOVING:
         return plan.result
-    if math.hypot(here.vx, here.vy) > plan.limits.speed * (1 + ROUNDING) or abs(here.rate) > plan.limits.rate * (
+    if math.hypot(here.vx, here.vy) > plan.allowed.speed * (1 + ROUNDING) or abs(here.rate) > plan.allowed.rate * (
         1 + ROUNDING
     ):
         return Result.SLOWING

@@ -1,6 +1,7 @@
 """Pieces of a time-optimal motion in the plane, each in closed form.
 
-Units: the speed limit V and the acceleration limit A are 1, hence times are in V / A and distances in V^2 / A. By
+Units: the speed limit V and the acceleration limit A are 1, hence times are in V / A and distances in V^2 / A. Vectors
+are complex numbers, x + i y: a product turns and scales, and takes one operation where components take six. By
 Pontryagin's maximum principle the costate of the velocity is linear in time, c(t) = -s e + m d n, with e a unit vector,
 n its left normal, s the time since the costate was shortest, d that shortest length and m = +-1; the acceleration is
 c / |c|.
@@ -10,98 +11,125 @@ maximum principles for optimal control problems with state constraints", SIAM Re
 
 from __future__ import annotations
 
+import cmath
 import math
-from dataclasses import dataclass
-from typing import ClassVar
+from collections.abc import Iterable
+from typing import NamedTuple
 
-Vector = tuple[float, float]
-Place = tuple[float, float, float, float]
-"""Displacement x, y and velocity x, y."""
+Place = tuple[complex, complex]
+"""Displacement and velocity."""
 
 
-@dataclass(frozen=True, slots=True)
-class Ramp:
+class Ramp(NamedTuple):
     """Constant acceleration, zero on a stretch of constant velocity."""
 
     duration: float
-    velocity: Vector
-    acceleration: Vector = (0.0, 0.0)
+    velocity: complex
+    acceleration: complex = 0j
 
     @property
     def case(self) -> str:
-        return "ramp" if any(self.acceleration) else "cruise"
+        return "ramp" if self.acceleration else "cruise"
 
     def at(self, time: float) -> Place:
-        vx, vy = self.velocity
-        ax, ay = self.acceleration
-        half = time / 2
-        return (vx + ax * half) * time, (vy + ay * half) * time, vx + ax * time, vy + ay * time
+        change = self.acceleration * time
+        return (self.velocity + change / 2) * time, self.velocity + change
 
 
-@dataclass(frozen=True, slots=True)
-class Slide:
+class Slide(NamedTuple):
     """The velocity turns on the circle of the speed limit, at the full acceleration.
 
     Attributes:
-        heading: of the velocity at the start [rad].
+        velocity: at the start.
         side: +1 turns counter-clockwise, -1 clockwise.
     """
 
-    case: ClassVar = "slide"
     duration: float
-    heading: float
+    velocity: complex
     side: float
 
+    @property
+    def case(self) -> str:
+        return "slide"
+
     def at(self, time: float) -> Place:
-        angle = self.heading + self.side * time
-        vx, vy = math.cos(angle), math.sin(angle)
-        dx = self.side * (vy - math.sin(self.heading))
-        return dx, self.side * (math.cos(self.heading) - vx), vx, vy
+        velocity = self.velocity * cmath.rect(1.0, self.side * time)
+        return (self.velocity - velocity) * 1j * self.side, velocity
 
 
-@dataclass(frozen=True, slots=True)
-class Bend:
+class Bend(NamedTuple):
     """Full acceleration whose direction turns from e over the side n to -e, as the linear costate does.
 
     Attributes:
         velocity: at the start.
-        direction: of e, as cosine and sine.
+        direction: e.
         side: m, +1 if the acceleration turns counter-clockwise, else -1.
         shortest: d, positive.
         begin: u at the start, where s = d sinh u.
     """
 
-    case: ClassVar = "bend"
     duration: float
-    velocity: Vector
-    direction: Vector
+    velocity: complex
+    direction: complex
     side: float
     shortest: float
     begin: float
 
+    @property
+    def case(self) -> str:
+        return "bend"
+
     def at(self, time: float) -> Place:
-        d, u0 = self.shortest, self.begin
+        _, velocity, direction, side, d, u0 = self
         s0, r0 = d * math.sinh(u0), d * math.cosh(u0)
         s = s0 + time
-        r, u = math.hypot(s, d), math.asinh(s / d)
+        r, turned = math.hypot(s, d), math.asinh(s / d) - u0
         along = r0 - r
-        across = self.side * d * (u - u0)
-        x = r0 * time - (s * r - s0 * r0 + d * d * (u - u0)) / 2
-        y = self.side * d * (s * (u - u0) + along)
-        (c, n), (vx, vy) = self.direction, self.velocity
+        x = r0 * time - (s * r - s0 * r0 + d * d * turned) / 2
+        y = side * d * (s * turned + along)
         return (
-            vx * time + c * x - n * y,
-            vy * time + n * x + c * y,
-            vx + c * along - n * across,
-            vy + n * along + c * across,
+            velocity * time + direction * complex(x, y),
+            velocity + direction * complex(along, side * d * turned),
         )
 
 
 Arc = Ramp | Slide | Bend
 
 
-def ramp_between(start: Vector, end: Vector) -> Ramp:
+class Chain(NamedTuple):
+    """Arcs one after the other.
+
+    Attributes:
+        arcs: none without a duration.
+        places: at the start of each arc and at the end of the last.
+        times: of the places.
+    """
+
+    arcs: tuple[Arc, ...]
+    places: tuple[Place, ...]
+    times: tuple[float, ...]
+
+    @property
+    def duration(self) -> float:
+        return self.times[-1]
+
+
+def chain(start: complex, arcs: Iterable[Arc]) -> Chain:
+    """The arcs with their places, from a velocity on."""
+    lasting = tuple([arc for arc in arcs if arc.duration > 0])
+    way, velocity, time = 0j, start, 0.0
+    places, times = [(way, velocity)], [time]
+    for arc in lasting:
+        displacement, velocity = arc.at(arc.duration)
+        way += displacement
+        time += arc.duration
+        places.append((way, velocity))
+        times.append(time)
+    return Chain(lasting, tuple(places), tuple(times))
+
+
+def ramp_between(start: complex, end: complex) -> Ramp:
     """The straight change of velocity at full acceleration; with the same velocity at both ends it takes no time."""
-    dx, dy = end[0] - start[0], end[1] - start[1]
-    duration = math.hypot(dx, dy)
-    return Ramp(duration, start, (dx / duration, dy / duration) if duration else (0.0, 0.0))
+    change = end - start
+    duration = abs(change)
+    return Ramp(duration, start, change / duration if duration else 0j)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 ROUNDING: Final = 1e-14
 AT_ONCE_S: Final = 1e-12
 
 
-@dataclass(frozen=True, slots=True)
-class AxisPlan:
+class AxisPlan(NamedTuple):
     """A way in pieces of constant acceleration.
 
     Attributes:
@@ -52,16 +50,28 @@ def fastest(travel: float, start: float, end: float, limit: float, acceleration:
         limit: the highest speed [unit/s], positive.
         acceleration: the highest acceleration [unit/s2], positive.
     """
+    peak, hold = _course(travel, start, end, limit, acceleration)
+    return _by_peak(start, peak, end, acceleration, hold)
+
+
+def least_duration(travel: float, start: float, end: float, limit: float, acceleration: float) -> float:
+    """How long the fastest way takes [s], without the way."""
+    peak, hold = _course(travel, start, end, limit, acceleration)
+    return (abs(peak - start) + abs(end - peak)) / acceleration + hold
+
+
+def _course(travel: float, start: float, end: float, limit: float, acceleration: float) -> tuple[float, float]:
+    """Speed between the two changes of the fastest way, and how long it is held."""
     direct = (start + end) / 2 * abs(end - start) / acceleration
     if abs(travel - direct) <= ROUNDING * (start * start + end * end) / acceleration:
-        return _by_peak(start, end, end, acceleration, 0.0)
-    side = math.copysign(1.0, travel - direct)
+        return end, 0.0
+    side = 1.0 if travel > direct else -1.0
     free_peak = math.sqrt(max(0.0, side * acceleration * travel + (start * start + end * end) / 2))
     if free_peak <= limit:
-        return _by_peak(start, side * free_peak, end, acceleration, 0.0)
+        return side * free_peak, 0.0
     peak = side * limit
     changes = (abs(peak - start) * (start + peak) + abs(end - peak) * (peak + end)) / (2 * acceleration)
-    return _by_peak(start, peak, end, acceleration, max(0.0, (travel - changes) / peak))
+    return peak, max(0.0, (travel - changes) / peak)
 
 
 def in_time(

@@ -1,6 +1,6 @@
 """Motions in the plane without a cruise: two straight changes of velocity, and the optimal bend near them.
 
-Units as in planner_arcs.
+Units and vectors as in planner_arcs.
 """
 
 from __future__ import annotations
@@ -9,42 +9,70 @@ import math
 from collections.abc import Callable, Iterator
 from typing import Final
 
-from daemon.loops.planner_arcs import Bend, Ramp, Vector, ramp_between
+from daemon.loops.planner_arcs import Bend, Ramp, ramp_between
+
+Trial = tuple[complex, complex, complex]
+"""What is missing with two numbers, and its slopes by each of them."""
 
 ROUNDING: Final = 1e-12
 STRAIGHT: Final = 1e-9
 """Below this length of the shortest costate, relative to the duration, a bend is two straight changes of velocity."""
-TRIALS: Final = 15
+TRIALS: Final = 25
 LEAST_STEP: Final = 1e-1
 """Part of a Newton step that is taken even where it does not help."""
+CONVERGED: Final = 1e-6
+"""A Newton step as short as this, relative to the numbers, leaves its square, which is none."""
 RATIOS: Final = 1.2, 1.6, 3.0
 """Lengths of the costate at the end of a bend over that at its start, tried as guesses."""
+MOST: Final = 40.0
+"""Highest |u| of a bend: there its costate is 1e17 times longer than at its shortest."""
+NOWHERE: Final[Trial] = complex(math.inf, math.inf), 0j, 0j
+SHORTEST_PART: Final = 1e-6
+"""Angle of the costate [rad] within which the speed hardly differs."""
+LIMIT: Final = 1.0 + ROUNDING
+"""The speed limit."""
 
 
-def corner(travel: Vector, start: Vector, end: Vector, guess: Vector) -> Vector | None:
+def corner(travel: complex, start: complex, end: complex, guess: complex, precise: float = ROUNDING) -> complex | None:
     """The velocity between two straight changes of velocity that cover the travel, however high it is.
 
     There is more than one where a fast goal is so near that it is passed and met again.
+
+    Args:
+        travel: displacement to the goal.
+        start: velocity at the start.
+        end: velocity at the goal.
+        guess: where the search begins.
+        precise: part of the travel that may be missed.
     """
-    (px, py), (ax, ay), (bx, by) = travel, start, end
 
-    def missing(x: float, y: float) -> Vector:
-        first, last = math.hypot(x - ax, y - ay), math.hypot(bx - x, by - y)
-        return px - ((ax + x) * first + (bx + x) * last) / 2, py - ((ay + y) * first + (by + y) * last) / 2
+    def missing(x: float, y: float) -> Trial:
+        via = complex(x, y)
+        first, last = via - start, via - end
+        before, after = abs(first), abs(last)
+        begun, ended = start + via, end + via
+        left = travel - (begun * before + ended * after) / 2
+        before_turned, after_turned = first / (before or 1.0), last / (after or 1.0)
+        by_x = before + after + begun * before_turned.real + ended * after_turned.real
+        by_y = (before + after) * 1j + begun * before_turned.imag + ended * after_turned.imag
+        return left, by_x / -2, by_y / -2
 
-    way = math.hypot(px, py)
-    return solve_pair(missing, guess, ROUNDING * (way + math.hypot(ax, ay, bx, by) ** 2), math.sqrt(way) + 1.0)
+    way = abs(travel)
+    miss = precise * (way + abs(start) ** 2 + abs(end) ** 2)
+    found = solve_pair(missing, (guess.real, guess.imag), miss, math.sqrt(way) + 1.0)
+    return complex(*found) if found else None
 
 
-def ramps(start: Vector, end: Vector, via: Vector) -> list[Ramp]:
+def ramps(start: complex, end: complex, via: complex) -> list[Ramp]:
     """Two straight changes of velocity."""
     return [ramp_between(start, via), ramp_between(via, end)]
 
 
-def bend(travel: Vector, start: Vector, end: Vector, via: Vector) -> Bend | None:
+def bend(travel: complex, start: complex, end: complex, via: complex) -> Bend | None:
     """The bend that covers the travel; None if there is none, or none that differs from a straight line.
 
-    The first guess takes the linear costate that points along the two straight changes of velocity at their middles.
+    The first guess takes the linear costate that points along the two straight changes of velocity at their middles,
+    half as long where it is shortest.
 
     Args:
         travel: displacement to the goal.
@@ -52,30 +80,30 @@ def bend(travel: Vector, start: Vector, end: Vector, via: Vector) -> Bend | None
         end: velocity at the goal.
         via: the corner.
     """
-    fx, fy, lx, ly = via[0] - start[0], via[1] - start[1], end[0] - via[0], end[1] - via[1]
-    first, duration = math.hypot(fx, fy), math.hypot(fx, fy) + math.hypot(lx, ly)
-    turn, change = fx * ly - fy * lx, math.hypot(lx - fx, ly - fy)
+    first, last = via - start, end - via
+    duration = abs(first) + abs(last)
+    back, change = first.conjugate(), abs(last - first)
+    turn = (back * last).imag
     if abs(turn) <= STRAIGHT * change * change or start == end:
         return None
     scale = duration / 2 / (change * change)
-    shortest, begin = abs(turn) * scale, (fx * (lx - fx) + fy * (ly - fy)) * scale - first / 2
-    side = math.copysign(1.0, turn)
+    shortest, begin = abs(turn) * scale / 2, (back * (last - first)).real * scale - abs(first) / 2
     guess = math.asinh(begin / shortest), math.asinh((begin + duration) / shortest)
-    return _bend_near(travel, start, end, side, guess)
+    return _bend_near(travel, start, end, math.copysign(1.0, turn), guess)
 
 
-def bends(travel: Vector, start: Vector, end: Vector) -> Iterator[Bend]:
+def bends(travel: complex, start: complex, end: complex) -> Iterator[Bend]:
     """Bends without a corner to begin from, as where little more than a straight change of velocity is left to do.
 
     What that change misses tells the side; the turn that makes up for it, 12 / length^2 of the miss, is tried as the
     first, the middle and the last part of a bend.
     """
-    x, y = end[0] - start[0], end[1] - start[1]
-    length = math.hypot(x, y)
+    change = end - start
+    length = abs(change)
     if not length:
         return
-    missed = travel[0] - (start[0] + end[0]) / 2 * length, travel[1] - (start[1] + end[1]) / 2 * length
-    across = (x * missed[1] - y * missed[0]) / length
+    missed = travel - (start + end) / 2 * length
+    across = (change.conjugate() * missed).imag / length
     turn = min(1.0, 12 * abs(across) / (length * length)) or 1.0
     for ratio in RATIOS:
         near, far = math.asinh((1 - 1 / ratio) / turn), math.log(ratio)
@@ -84,99 +112,107 @@ def bends(travel: Vector, start: Vector, end: Vector) -> Iterator[Bend]:
                 yield arc
 
 
-def _bend_near(travel: Vector, start: Vector, end: Vector, side: float, guess: Vector) -> Bend | None:
-    (px, py), (vx, vy) = travel, start
-    dx, dy = end[0] - vx, end[1] - vy
-    change = math.hypot(dx, dy)
+def _bend_near(travel: complex, start: complex, end: complex, side: float, guess: tuple[float, float]) -> Bend | None:
+    """Newton's method for both ends of the bend.
 
-    def missing(u0: float, u1: float) -> Vector:
-        """The travel less that of `bend_between`, without the bend: in units of its shortest costate d."""
+    In units of the shortest costate d, and turned with it, the velocity changes by a turn, the displacement is the
+    start's velocity times the duration and a rest.
+    """
+    change = end - start
+
+    def missing(u0: float, u1: float) -> Trial:
         if not -MOST < u0 < u1 < MOST:
-            return math.inf, math.inf
+            return NOWHERE
         s0, r0, s1, r1 = math.sinh(u0), math.cosh(u0), math.sinh(u1), math.cosh(u1)
         turned, time = u1 - u0, s1 - s0
-        along, across = 2 * math.sinh((u0 - u1) / 2) * math.sinh((u0 + u1) / 2), side * turned
-        square = along * along + across * across
-        d = change / math.sqrt(square)
-        x, y = r0 * time - (s1 * r1 - s0 * r0 + turned) / 2, side * (s1 * turned + along)
-        c, n = (dx * along + dy * across) / square, (dy * along - dx * across) / square
-        return px - d * (vx * time + c * x - n * y), py - d * (vy * time + n * x + c * y)
+        turn = complex(r0 - r1, side * turned)
+        scale = change / turn
+        shortest = abs(scale)
+        rest = complex(r0 * time - (s1 * r1 - s0 * r0 + turned) / 2, side * (s1 * turned + turn.real))
+        way = start * time + scale * rest
+        back = complex(s0, -side)
+        by_back, by_front = back / turn, complex(-s1, side) / turn
+        by_u0 = scale * (time * back - rest * by_back) - start * r0 - way * by_back.real
+        by_u1 = scale * (r1 * turn - rest * by_front) + start * r1 - way * by_front.real
+        return travel - shortest * way, by_u0 * -shortest, by_u1 * -shortest
 
-    ends = solve_pair(missing, guess, ROUNDING * (math.hypot(*travel) + change * change), 1.5)
+    ends = solve_pair(missing, guess, ROUNDING * (abs(travel) + abs(change) ** 2), 1.5)
     return bend_between(start, end, side, *ends) if ends else None
 
 
-MOST: Final = 40.0
-"""Highest |u| of a bend: there its costate is 1e17 times longer than at its shortest."""
-
-
-def bend_between(start: Vector, end: Vector, side: float, u0: float, u1: float) -> Bend:
+def bend_between(start: complex, end: complex, side: float, u0: float, u1: float) -> Bend:
     """The bend from u0 to u1, scaled and turned so that it leads from one velocity to the other."""
-    along = 2 * math.sinh((u0 - u1) / 2) * math.sinh((u0 + u1) / 2)
-    across = side * (u1 - u0)
-    length = along * along + across * across
-    x, y = end[0] - start[0], end[1] - start[1]
-    shortest = math.hypot(x, y) / math.sqrt(length)
-    scale = 1.0 / (shortest * length)
-    direction = (x * along + y * across) * scale, (y * along - x * across) * scale
-    return Bend(shortest * (math.sinh(u1) - math.sinh(u0)), start, direction, side, shortest, u0)
+    turn = complex(2 * math.sinh((u0 - u1) / 2) * math.sinh((u0 + u1) / 2), side * (u1 - u0))
+    scale = (end - start) / turn
+    shortest = abs(scale)
+    return Bend(shortest * (math.sinh(u1) - math.sinh(u0)), start, scale / shortest, side, shortest, u0)
 
 
-def top_speed(arc: Bend) -> float:
-    """The highest speed within a bend, or 1 where it is certainly no higher.
+def leads_farthest(arc: Bend, end: complex) -> bool:
+    """Whether no shorter motion covers what a bend covers; where this is false, there may be one.
 
-    The velocity keeps to one side of its tangents at both ends, so where they cross within the limit, all of it is.
-    Else it is found where speed stops to rise between two samples, by bisection.
+    How far a motion can lead in the direction of the costate, beyond what is left to cover, is convex in its duration:
+    it grows by e . start + |c| where c, followed back from the end, has got to, and in the reverse by e . end + |c|.
+    Where it does nothing but grow up to the bend's duration, it was too little before (maximum principle; what can be
+    reached in a time is convex).
+
+    Args:
+        arc: the bend.
+        end: velocity at its end.
     """
-    if _crossing_speed(arc) <= 1.0:
-        return 1.0
-    samples = [arc.duration * k / SAMPLES for k in range(SAMPLES + 1)]
-    rises = [_speed_rises(arc, time) for time in samples]
-    tops = [samples[0], samples[-1]]
-    for low, high, rose, rises_still in zip(samples, samples[1:], rises, rises[1:], strict=False):
-        if rose and not rises_still:
-            for _ in range(20):
-                middle = (low + high) / 2
-                low, high = (middle, high) if _speed_rises(arc, middle) else (low, middle)
-            tops.append(low)
-    return max(math.hypot(*arc.at(time)[2:]) for time in tops)
+    begin = arc.shortest * math.sinh(arc.begin)
+    nearest = max(begin, 0.0) or min(begin + arc.duration, 0.0)
+    back = arc.direction.conjugate()
+    fastest = max((arc.velocity * back).real, (end * back).real)
+    return fastest + math.hypot(nearest, arc.shortest) >= 0.0
 
 
-def _crossing_speed(arc: Bend) -> float:
-    """Speed where the tangents of the velocity at both ends of a bend cross."""
-    _, _, ex, ey = arc.at(arc.duration)
-    (vx, vy), (ax, ay), (bx, by) = arc.velocity, _costate(arc, 0.0), _costate(arc, arc.duration)
-    turning = ax * by - ay * bx
-    if turning == 0.0:
-        return math.inf
-    way = ((ex - vx) * by - (ey - vy) * bx) / turning
-    return max(math.hypot(vx, vy), math.hypot(ex, ey), math.hypot(vx + way * ax, vy + way * ay))
+def keeps_limit(arc: Bend, end: complex) -> bool:
+    """Whether the speed is nowhere within a bend above the limit.
+
+    The velocity keeps to one side of its tangents at both ends of a part, so where they cross within the limit, all of
+    the part is; so it is where the part is too short to get beyond. Any other part is halved by the angle of the
+    costate, until a velocity is above the limit.
+
+    Args:
+        arc: the bend.
+        end: velocity at its end.
+    """
+    back, d, u0 = arc.direction.conjugate(), arc.shortest, arc.begin
+    start, final = arc.velocity * back, end * back
+    if arc.side < 0.0:
+        start, final = start.conjugate(), final.conjugate()
+    begin, from_shortest = math.sinh(u0), d * math.cosh(u0)
+    parts = [(begin, start, begin + arc.duration / d, final)]
+    while parts:
+        low, before, high, after = parts.pop()
+        if abs(before) + abs(after) + (high - low) * d <= 2.0 or _crossing_speed(low, before, high, after) <= LIMIT:
+            continue
+        short, long = math.hypot(1.0, low), math.hypot(1.0, high)
+        middle = (low * long + high * short) / (short + long)
+        along, across = from_shortest - d * math.hypot(1.0, middle), d * (math.asinh(middle) - u0)
+        velocity = start + complex(along, across)
+        if abs(velocity) > LIMIT:
+            return False
+        if high - low > SHORTEST_PART * short:
+            parts += (low, before, middle, velocity), (middle, velocity, high, after)
+    return True
 
 
-def _costate(arc: Bend, time: float) -> Vector:
-    """In the direction of the acceleration."""
-    s = arc.shortest * math.sinh(arc.begin) + time
-    (c, n), d = arc.direction, arc.side * arc.shortest
-    return -s * c - d * n, d * c - s * n
-
-
-SAMPLES: Final = 16
-
-
-def _speed_rises(arc: Bend, time: float) -> bool:
-    """Whether velocity and costate point the same way."""
-    _, _, vx, vy = arc.at(time)
-    x, y = _costate(arc, time)
-    return vx * x + vy * y > 0
+def _crossing_speed(low: float, before: complex, high: float, after: complex) -> float:
+    """Speed where the tangents of a velocity cross, from the side of the acceleration; both ends given with s / d."""
+    change = after - before
+    way = (change.real + change.imag * high) / (high - low)
+    return abs(before + way * complex(-low, 1.0))
 
 
 def solve_pair(
-    missing: Callable[[float, float], Vector], guess: Vector, tolerance: float, longest: float
-) -> Vector | None:
+    missing: Callable[[float, float], Trial], guess: tuple[float, float], tolerance: float, longest: float
+) -> tuple[float, float] | None:
     """The two numbers for which nothing is missing: Newton's method, its steps halved while they do not help.
 
     Args:
-        missing: what is missing with two numbers; infinite where they are not allowed.
+        missing: what is missing with two numbers, infinite where they are not allowed, and its slopes.
         guess: the first two numbers.
         tolerance: what may be missing.
         longest: step allowed.
@@ -184,22 +220,25 @@ def solve_pair(
     Returns:
         The numbers; None if it does not converge.
     """
-    (x, y), (rx, ry) = guess, missing(*guess)
+    (x, y), (left, by_x, by_y) = guess, missing(*guess)
     for _ in range(TRIALS):
-        error = math.hypot(rx, ry)
+        error = abs(left)
         if error <= tolerance:
             return x, y
-        h = 1e-7 * (1 + abs(x) + abs(y))
-        (ax, ay), (bx, by) = missing(x + h, y), missing(x, y + h)
-        xx, yx, xy, yy = (rx - ax) / h, (ry - ay) / h, (rx - bx) / h, (ry - by) / h
-        determinant = xx * yy - xy * yx
-        if determinant == 0.0 or not math.isfinite(determinant):
+        if not by_x:
             return None
-        dx, dy = (rx * yy - ry * xy) / determinant, (xx * ry - yx * rx) / determinant
-        factor = min(1.0, longest / (math.hypot(dx, dy) or 1.0))
-        rx, ry = missing(x + factor * dx, y + factor * dy)
-        while not math.hypot(rx, ry) < error and factor > LEAST_STEP:
+        step, ratio = left / by_x, by_y / by_x
+        if not (ratio.imag and math.isfinite(ratio.imag)):
+            return None
+        dy = -step.imag / ratio.imag
+        dx = -step.real - ratio.real * dy
+        length = abs(dx) + abs(dy)
+        if length <= CONVERGED:
+            return x + dx, y + dy
+        factor = min(1.0, longest / length)
+        left, by_x, by_y = missing(x + factor * dx, y + factor * dy)
+        while not abs(left) < error and factor > LEAST_STEP:
             factor /= 2
-            rx, ry = missing(x + factor * dx, y + factor * dy)
+            left, by_x, by_y = missing(x + factor * dx, y + factor * dy)
         x, y = x + factor * dx, y + factor * dy
     return None

@@ -1,135 +1,180 @@
 """Motions in the plane that reach the speed limit: a change of velocity, a cruise, another change.
 
-Units as in planner_arcs; along and across are meant with respect to the cruise. From the goal back in time to a cruise
-is the same problem as from the start to it.
+Units and vectors as in planner_arcs. Velocities relative to a cruise have it along the real axis: along + i across.
+From the goal back in time to a cruise is the same problem as from the start to it.
 """
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Callable
-from typing import Final
+from typing import Final, NamedTuple
 
-from daemon.loops.planner_arcs import Arc, Bend, Ramp, Slide, Vector, ramp_between
+from daemon.loops.planner_arcs import Arc, Bend, Ramp, Slide, ramp_between
 
-Half = Callable[[float, float], Vector]
-"""From a velocity (along, across) to the cruise: displacement along and across."""
 
-STEEPEST: Final = math.pi / 3
-"""An optimal bend meets the circle of the speed limit no farther than this from the cruise."""
+class Cruise(NamedTuple):
+    """A heading, as a unit vector, with the contacts [rad] of the changes of velocity before and after it."""
+
+    heading: complex
+    first: float
+    last: float
+
+
+Change = tuple[float, float, float, float]
+"""Displacement across the cruise; its slope by the heading; the contact where the bend meets the circle of the speed
+limit, as an angle from the cruise [rad], 0 without a bend; its slope by the heading."""
+Half = Callable[[complex, float], Change]
+"""From a velocity relative to the cruise, and where the contact is thought to be, to the change of velocity."""
+
+STEEPEST: Final = 1.047
+"""An optimal bend meets the circle of the speed limit at less than pi / 3 from the cruise."""
 FLAT: Final = 1e-13
 """Below this, a velocity across is none."""
+ON_CIRCLE: Final = 1e-12
+"""A velocity as near to the speed limit as this slides, within pi / 3 of the cruise."""
+LEAST_BENT: Final = 1e-9
+"""Where a velocity is near the circle, so is the zero of the bend's slope."""
+TRIALS: Final = 30
+LONGEST_STEP: Final = 0.5
+CONVERGED: Final = 1e-6
+"""A Newton step as short as this leaves its square, which is none."""
+AT_REST: Final[Change] = 0.0, 0.0, 0.0, 0.0
+"""From rest every heading is alike."""
 
 
-def cruise(half: Half, travel: Vector, start: Vector, end: Vector, heading: float) -> Vector | None:
-    """Heading [rad] and length of the cruise; None if there is none.
+def cruise(half: Half, travel: complex, start: complex, end: complex, heading: complex) -> Cruise | None:
+    """The cruise in whose heading the rest of the travel lies, changes of velocity taken off; None if none is found.
 
-    Seeks the heading in which the rest of the travel lies, both changes of velocity taken off (secant method).
+    Newton's method for the heading and both contacts at once.
 
     Args:
-        half: displacement of a change of velocity.
+        half: change of velocity.
         travel: displacement to the goal.
         start: velocity at the start.
         end: velocity at the goal.
-        heading: where the search begins [rad].
+        heading: where the search begins, a unit vector.
     """
-    step = last_across = math.nan
-    for _ in range(16):
-        c, s = math.cos(heading), math.sin(heading)
-        first_along, first_across = half(start[0] * c + start[1] * s, start[1] * c - start[0] * s)
-        last_along, end_across = half(end[0] * c + end[1] * s, end[1] * c - end[0] * s)
-        along = travel[0] * c + travel[1] * s - first_along - last_along
-        across = travel[1] * c - travel[0] * s - first_across - end_across
-        if abs(across) < 1e-13 * (1 + abs(along)):
-            return (heading, along) if along >= 0.0 else None
-        if math.isnan(last_across):
-            step = across / (1 + abs(along))
-        elif last_across != across:
-            step *= across / (last_across - across)
-        step = max(-0.5, min(0.5, step))
-        heading, last_across = heading + step, across
+    first = last = 0.0
+    for _ in range(TRIALS):
+        back = heading.conjugate()
+        left = travel * back
+        begun, begun_slope, first_contact, first_slope = half(start * back, first)
+        ended, ended_slope, last_contact, last_slope = half(end * back, last) if end else AT_REST
+        slope = left.real + begun_slope + ended_slope
+        if not slope:
+            return None
+        step = (left.imag - begun - ended) / slope
+        if abs(step) > LONGEST_STEP:
+            step = math.copysign(LONGEST_STEP, step)
+        heading *= cmath.rect(1.0, step)
+        first_before, first = first, first_contact + first_slope * step
+        last_before, last = last, last_contact + last_slope * step
+        if (
+            abs(step) < CONVERGED
+            and _settled(start, step, first_before, first)
+            and _settled(end, step, last_before, last)
+        ):
+            return Cruise(heading, first, last)
     return None
 
 
-def half_ramp(along: float, across: float) -> Vector:
-    """Displacement of the straight change from a velocity to the cruise."""
-    time = math.hypot(1 - along, across)
-    return (1 + along) / 2 * time, across / 2 * time
+def _settled(velocity: complex, step: float, before: float, contact: float) -> bool:
+    """Whether a contact has converged; without a bend, whether the velocity stays in line with the cruise."""
+    return abs(contact - before) <= CONVERGED * before if contact else abs(velocity * step) < FLAT
 
 
-def ramp_arcs(start: Vector, end: Vector, heading: float, length: float) -> list[Arc]:
-    """Straight change of velocity, cruise, straight change of velocity."""
-    fast = math.cos(heading), math.sin(heading)
-    return [ramp_between(start, fast), Ramp(length, fast), ramp_between(fast, end)]
+def half_ramp(velocity: complex, _: float) -> Change:
+    """The straight change from a velocity to the cruise."""
+    time = abs(1 - velocity)
+    if not time:
+        return 0.0, 0.0, 0.0, 0.0
+    along, across = velocity.real, velocity.imag
+    return across / 2 * time, -(across * across / time + along * time) / 2, 0.0, 0.0
 
 
-def half_turn(along: float, across: float) -> Vector:
-    """Displacement of the optimal change from a velocity to the cruise: a bend, then a slide."""
-    if abs(across) < FLAT:
-        return (1 - along * along) / 2, 0.0
-    p, h = contact(along, abs(across))
-    c, s = math.cos(p), math.sin(p)
-    b = s * s / (1 + c)
-    d = b * c
-    u = math.asinh(s / c) + h
-    sh, ch = math.sinh(u), math.cosh(u)
-    bending = d * (sh - s / c)
-    forward = bending - d * d * (sh * ch + h - s / (c * c)) / 2 + s
-    return forward, math.copysign(s * bending + d * d * (h * sh - ch + 1 / c) + 1 - c, across)
-
-
-def contact(along: float, across: float) -> Vector:
-    """Where the optimal change from a velocity to the cruise meets the circle of the speed limit.
+def half_turn(velocity: complex, contact: float) -> Change:
+    """The optimal change from a velocity to the cruise: a bend, then a slide.
 
     The bend meets the circle tangentially at an angle p from the cruise. With b = 1 - cos p and the bend lasting over h
     of its u, the constant Hamiltonian makes along = 1 - b (cosh h + sin p sinh h), and the costate across = sin p +
-    b h cos p. h follows from the first equation; p is the zero of the second (Newton's method, kept in a bracket).
+    b h cos p. h follows from the first equation; a Newton step leads from a guess of p towards the zero of the second.
+    What the change costs, its duration less its displacement along, has the costate for its gradient; turned with the
+    heading that is the displacement across, b (along cos p + across root) with root = b sinh u / (1 - along).
 
     Args:
-        along: component of the velocity, at most 1.
-        across: the other component, positive.
-
-    Returns:
-        p [rad] and h.
+        velocity: at most 1.
+        contact: p, 0 to begin with a polynomial that is near it.
     """
-    low, high = 0.0, min(math.asin(min(1.0, across)), STEEPEST)
-    p, h = high, 0.0
-    for _ in range(60):
-        c, s = math.cos(p), math.sin(p)
-        b = s * s / (1 + c)
-        ratio = (1 - along) / b
-        h = math.log(max(1.0, (ratio + math.sqrt(max(0.0, ratio * ratio - c * c))) / (1 + s)))
-        error = s + b * c * h - across
-        if abs(error) < 1e-15 * (1 + across) or high - low < 1e-16:
-            break
-        low, high = (low, p) if error > 0 else (p, high)
-        sh, ch = math.sinh(h), math.cosh(h)
-        slope = c + h * s * (2 * c - 1) - c * (ratio * s + b * c * sh) / (sh + s * ch)
-        p -= error / slope if slope > 0 else math.inf
-        if not low < p < high:
-            p = (low + high) / 2
-    return p, h
+    along, signed = velocity.real, velocity.imag
+    across = abs(signed)
+    if across < FLAT:
+        return 0.0, -along * (1 - along), 0.0, 0.0
+    if along > 0.5 and 1 - along * along - across * across < ON_CIRCLE:
+        turned = math.copysign(1.0, signed)
+        return turned * (1 - along), -across, math.atan2(across, along), -turned
+    p = contact if 0.0 < contact < STEEPEST else across * (0.87 + 0.08 * along - across * (0.74 - 0.69 * across))
+    s = math.sin(p)
+    if s > across:
+        p, s = math.asin(across), across
+    c = math.cos(p)
+    b = s * s / (1 + c)
+    q, root, h = _bend_to(along, c, s, b)
+    tilt = along - across * c / root
+    bent = max(1 + s * (h - q / root), LEAST_BENT)
+    narrow = 2 * c - 1
+    miss = (across - s - b * c * h) / (narrow * bent)
+    displaced = b * (along * c + across * root) + s * narrow * tilt * miss
+    slope = b * (across * c - along * root) - across * across * q / root - s * tilt * tilt / bent
+    contact_slope = tilt / (narrow * bent)
+    if signed < 0.0:
+        displaced, contact_slope = -displaced, -contact_slope
+    return displaced, slope, p + miss, -contact_slope
 
 
-def turn_arcs(start: Vector, end: Vector, heading: float, length: float) -> list[Arc]:
-    """Bend, slide, cruise, slide, bend; with a straight change of velocity in place of a turn that is none."""
-    e = math.cos(heading), math.sin(heading)
-    arcs = [*_turn(start, heading, e, 1.0), Ramp(length, e)]
-    return arcs + _turn(end, heading, e, -1.0)[::-1]
+def _bend_to(along: float, c: float, s: float, b: float) -> tuple[float, float, float]:
+    """q = (1 - along) / b, root = sqrt(q^2 - c^2), h = log((q + root) / (1 + s)); q / c is cosh u at the start."""
+    q = max((1 - along) / b, 1.0)
+    root = math.sqrt((q - 1) * (q + 1) + s * s)
+    return q, root, math.log((q + root) / (1 + s))
 
 
-def _turn(velocity: Vector, heading: float, e: Vector, toward: float) -> list[Arc]:
-    """Bend and slide from the velocity to the cruise (toward = 1) or, in reverse order, from the cruise to it (-1)."""
-    along, across = velocity[0] * e[0] + velocity[1] * e[1], velocity[1] * e[0] - velocity[0] * e[1]
-    if abs(across) < FLAT:
-        return [ramp_between(velocity, e) if toward > 0 else ramp_between(e, velocity)]
-    p, h = contact(along, abs(across))
-    c, s = math.cos(p), math.sin(p)
-    shortest, touch = s * s / (1 + c) * c, math.asinh(s / c)
-    duration = shortest * (math.sinh(touch + h) - s / c)
+def ramp_arcs(travel: complex, start: complex, end: complex, found: Cruise) -> list[Arc]:
+    """Straight change of velocity, cruise, straight change of velocity; none if the cruise would lead back."""
+    fast = found.heading
+    first, last = ramp_between(start, fast), ramp_between(fast, end)
+    left = travel - ((start + fast) * first.duration + (fast + end) * last.duration) / 2
+    length = (left * fast.conjugate()).real
+    return [first, Ramp(length, fast), last] if length >= 0.0 else []
+
+
+def turn_arcs(travel: complex, start: complex, end: complex, found: Cruise) -> list[Arc]:
+    """Bend, slide, cruise, slide, bend; a straight change of velocity in place of a turn that is none.
+
+    None at all if the cruise would lead back.
+    """
+    heading = found.heading
+    first, begun = _turn(start, heading, found.first, 1.0)
+    last, ended = _turn(end, heading, found.last, -1.0)
+    length = (travel * heading.conjugate()).real - begun - ended
+    return [*first, Ramp(length, heading), *last] if length >= 0.0 else []
+
+
+def _turn(velocity: complex, heading: complex, contact: float, toward: float) -> tuple[list[Arc], float]:
+    """From a velocity to the cruise (toward = 1) or from the cruise to it (-1), and the displacement along it."""
+    relative = velocity * heading.conjugate()
+    along, across = relative.real, relative.imag
+    if not contact:
+        ramp = ramp_between(velocity, heading) if toward > 0 else ramp_between(heading, velocity)
+        return [ramp], (1 - along * along) / 2
+    c, s = math.cos(contact), math.sin(contact)
+    b = s * s / (1 + c)
+    q, root, h = _bend_to(along, c, s, b)
+    bending, touch = b * (root - s), math.log((1 + s) / c)
+    forward = bending - b * b * (root * q + c * c * h - s) / 2 + s
     side = -toward * math.copysign(1.0, across)
-    meeting = heading + math.copysign(p, across)
+    meeting = heading * complex(c, math.copysign(s, across))
     if toward > 0:
-        return [Bend(duration, velocity, e, side, shortest, -touch - h), Slide(p, meeting, side)]
-    tangent = math.cos(meeting), math.sin(meeting)
-    return [Bend(duration, tangent, e, side, shortest, touch), Slide(p, heading, side)]
+        return [Bend(bending, velocity, heading, side, b * c, -touch - h), Slide(contact, meeting, side)], forward
+    return [Slide(contact, heading, side), Bend(bending, meeting, heading, side, b * c, touch)], forward

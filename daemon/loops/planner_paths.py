@@ -1,19 +1,23 @@
 """The fastest way in the plane from one velocity to a place and another velocity.
 
-Units as in planner_arcs. Three shapes are optimal: along a line, one bend, and two turns with a cruise between them.
-Where the optimum would touch the speed limit without a cruise, straight changes of velocity stand in for it.
+Units and vectors as in planner_arcs. Three shapes are optimal: along a line, one bend, and two turns with a cruise
+between them. Where the optimum would touch the speed limit without a cruise, straight changes of velocity stand in for
+it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final
 
-from daemon.loops.planner_arcs import Arc, Ramp, Vector, ramp_between
-from daemon.loops.planner_axis import fastest
-from daemon.loops.planner_bend import bend, bends, corner, ramps, top_speed
+from daemon.loops.planner_arcs import Arc, Bend, Chain, Ramp, chain, ramp_between
+from daemon.loops.planner_axis import fastest, least_duration
+from daemon.loops.planner_bend import bend, bends, corner, keeps_limit, leads_farthest, ramps
 from daemon.loops.planner_cruise import cruise, half_ramp, half_turn, ramp_arcs, turn_arcs
+
+Shaped = tuple[str, Sequence[Arc]]
+"""Name of a shape, and its arcs; none if it does not exist."""
 
 PRECISE: Final = 1e-11
 """Largest miss of an accepted way, relative to 1 + its length."""
@@ -21,15 +25,21 @@ LIKELY: Final = 1.1
 """A way that takes no more than this longer than a lower bound is taken for the fastest without a wider search."""
 MAY_CRUISE: Final = 0.7
 """Speed of the corner above which a cruise at the speed limit is sought."""
+LIKELY_CRUISE: Final = 1.05
+"""Speed of the corner above which a cruise is more likely than a bend within the speed limit."""
+FAR: Final = 2.75
+"""Travel from which on there is room for a cruise."""
 CRUISES: Final = 0.999
 """Speed at the start above which its heading may be that of the cruise."""
-SAME: Final = 1e-6
+ROUGH: Final = 3e-2
+"""Part of the travel that a corner may miss from which the search for a smooth way begins."""
+SAME: Final = 1e-2
 """Distance of two corners that are one."""
 IN_LINE: Final = 1e-13
 """Sine of the angle below which two vectors lie on one line."""
 
 
-def fastest_way(travel: Vector, start: Vector, end: Vector, near: float = 0.0) -> tuple[str, Sequence[Arc]]:
+def fastest_way(travel: complex, start: complex, end: complex, near: float = 0.0) -> tuple[str, Chain]:
     """The shape and the arcs of the fastest way.
 
     Args:
@@ -39,108 +49,116 @@ def fastest_way(travel: Vector, start: Vector, end: Vector, near: float = 0.0) -
         near: a straight change of velocity that ends as near to the goal as this is taken as the way.
     """
     if straight := in_line(travel, start, end):
-        return "line", straight
-    direct = [ramp_between(start, end)]
-    if misses(direct, travel, end) <= near:
-        return "ramp", direct
-    precise = PRECISE * (1 + math.hypot(*travel))
-    best: tuple[str, Sequence[Arc]] = "stop and go", stop_and_go(travel, start, end)
-    least, enough = duration(best[1]), LIKELY * least_time(travel, start, end)
+        return "line", chain(start, straight)
+    if abs((start + end) / 2 * abs(end - start) - travel) <= near:
+        return "ramp", chain(start, [ramp_between(start, end)])
+    precise = PRECISE * (1 + abs(travel))
+    best: tuple[str, Chain] | None = None
     for shape, arcs in _ways(travel, start, end):
-        if (time := duration(arcs)) < least and misses(arcs, travel, end) <= precise:
-            least, best = time, (shape, arcs)
-        if least <= enough:
-            break
-    return best
+        way = chain(start, arcs)
+        if (best is None or way.duration < best[1].duration) and misses(way, travel, end) <= precise:
+            best = shape, way
+            if _surely_fastest(way, travel, start, end):
+                return best
+    slow = chain(start, stop_and_go(travel, start, end))
+    return best if best and best[1].duration <= slow.duration else ("stop and go", slow)
 
 
-def _ways(travel: Vector, start: Vector, end: Vector) -> Iterator[tuple[str, Sequence[Arc]]]:
-    """Ways that exist, the likely ones first."""
-    middle = (start[0] + end[0]) / 2, (start[1] + end[1]) / 2
-    root = math.sqrt(math.hypot(*travel)) or 1.0
-    if math.hypot(*start) > CRUISES and (
-        found := cruise(half_turn, travel, start, end, math.atan2(start[1], start[0]))
-    ):
-        yield "turns", turn_arcs(start, end, *found)
-    known: list[Vector] = []
-    for guess in (travel[0] / root, travel[1] / root), middle, (-middle[0], -middle[1]):
-        via = corner(travel, start, end, guess)
-        if via and all(math.dist(via, other) > SAME for other in known):
+def _ways(travel: complex, start: complex, end: complex) -> Iterator[Shaped]:
+    """Ways that may exist, the likely ones first."""
+    size = abs(travel)
+    if size > FAR:
+        toward = travel / size
+        left = travel - ((start + toward) * abs(toward - start) + (toward + end) * abs(toward - end)) / 2
+        yield from _turns(travel, start, end, left)
+    if abs(start) > CRUISES:
+        yield from _turns(travel, start, end, start)
+    known: list[complex] = []
+    middle = (start + end) / 2
+    peak = math.sqrt(size + (abs(start) ** 2 + abs(end) ** 2) / 2)
+    for guess in travel * (peak / (size or 1.0)), middle, -middle:
+        via = corner(travel, start, end, guess, ROUGH)
+        if via is not None and all(abs(via - other) > SAME for other in known):
             known.append(via)
             yield from _ways_near(travel, start, end, via)
     for arc in bends(travel, start, end):
-        if top_speed(arc) <= 1 + PRECISE:
+        if keeps_limit(arc, end):
             yield "bend", [arc]
 
 
-def _ways_near(travel: Vector, start: Vector, end: Vector, via: Vector) -> Iterator[tuple[str, Sequence[Arc]]]:
+def _ways_near(travel: complex, start: complex, end: complex, via: complex) -> Iterator[Shaped]:
     """Ways like two straight changes of velocity by a corner."""
-    heading, speed = math.atan2(via[1], via[0]), math.hypot(*via)
-    if speed > MAY_CRUISE and (found := cruise(half_turn, travel, start, end, heading)):
-        yield "turns", turn_arcs(start, end, *found)
-    if (arc := bend(travel, start, end, via)) and top_speed(arc) <= 1 + PRECISE:
+    speed = abs(via)
+    if speed > LIKELY_CRUISE:
+        yield from _turns(travel, start, end, via)
+    if (arc := bend(travel, start, end, via)) and keeps_limit(arc, end):
         yield "bend", [arc]
-    if speed <= 1:
-        yield "ramps", ramps(start, end, via)
-    elif found := cruise(half_ramp, travel, start, end, heading):
-        yield "ramps", ramp_arcs(start, end, *found)
+    if MAY_CRUISE < speed <= LIKELY_CRUISE:
+        yield from _turns(travel, start, end, via)
+    if (exact := corner(travel, start, end, via)) is not None and abs(exact) <= 1:
+        yield "ramps", ramps(start, end, exact)
+    elif speed and (found := cruise(half_ramp, travel, start, end, via / speed)):
+        yield "ramps", ramp_arcs(travel, start, end, found)
 
 
-def least_time(travel: Vector, start: Vector, end: Vector) -> float:
-    """A time that no way can be faster than: that of one axis alone, the longest of three directions."""
-    change = end[0] - start[0], end[1] - start[1]
-    length = math.hypot(*change)
-    x, y = travel[0] - (start[0] + end[0]) / 2 * length, travel[1] - (start[1] + end[1]) / 2 * length
-    least = length
-    for vx, vy in travel, (x, y):
-        size = math.hypot(vx, vy) or 1.0
-        way, first, last = ((vx * ax + vy * ay) / size for ax, ay in (travel, start, end))
-        least = max(least, fastest(way, first, last, 1.0, 1.0).duration)
-    return least
+def _turns(travel: complex, start: complex, end: complex, heading: complex) -> Iterator[Shaped]:
+    """Two turns with a cruise near a heading."""
+    found = cruise(half_turn, travel, start, end, heading / abs(heading)) if heading else None
+    if found and (arcs := turn_arcs(travel, start, end, found)):
+        yield "turns", arcs
 
 
-def duration(arcs: Iterable[Arc]) -> float:
-    return math.fsum(arc.duration for arc in arcs)
+def _surely_fastest(way: Chain, travel: complex, start: complex, end: complex) -> bool:
+    """Whether no way is faster, or none by much."""
+    first = way.arcs[0]
+    return (isinstance(first, Bend) and len(way.arcs) == 1 and leads_farthest(first, end)) or any(
+        way.duration <= LIKELY * least for least in _least_times(travel, start, end)
+    )
 
 
-def misses(arcs: Iterable[Arc], travel: Vector, end: Vector) -> float:
-    """How far the end of the arcs is from the displacement or from the velocity, whichever is farther."""
-    x = y = 0.0
-    vx, vy = end
-    for arc in arcs:
-        dx, dy, vx, vy = arc.at(arc.duration)
-        x += dx
-        y += dy
-    return max(abs(x - travel[0]), abs(y - travel[1]), abs(vx - end[0]), abs(vy - end[1]))
+def _least_times(travel: complex, start: complex, end: complex) -> Iterator[float]:
+    """Times that no way can be faster than: those of one axis alone in two directions, and that of the velocity."""
+    missed = travel - (start + end) / 2 * abs(end - start)
+    for direction in travel, missed:
+        back = direction.conjugate() / (abs(direction) or 1.0)
+        yield least_duration((travel * back).real, (start * back).real, (end * back).real, 1.0, 1.0)
+    yield abs(end - start)
 
 
-def in_line(travel: Vector, start: Vector, end: Vector) -> list[Arc] | None:
+def misses(way: Chain, travel: complex, end: complex) -> float:
+    """How far the end of the way is from the displacement or from the velocity, whichever is farther."""
+    displacement, velocity = way.places[-1]
+    return max(abs(displacement - travel), abs(velocity - end))
+
+
+def in_line(travel: complex, start: complex, end: complex) -> list[Arc] | None:
     """Along one line, if the travel and both velocities lie on it."""
-    x, y = max(travel, start, end, key=lambda vector: math.hypot(*vector))
-    length = math.hypot(x, y)
-    if length == 0.0:
-        return [Ramp(0.0, start)]
-    x, y = x / length, y / length
-    if any(abs(x * v - y * u) > IN_LINE * math.hypot(u, v) for u, v in (travel, start, end)):
+    if abs((travel.conjugate() * start).imag) > IN_LINE * abs(travel) * abs(start):
         return None
-    return _on_line((x, y), *(x * u + y * v for u, v in (travel, start, end)))
+    longest = max(travel, start, end, key=abs)
+    if not longest:
+        return [Ramp(0.0, start)]
+    direction = longest / abs(longest)
+    back = direction.conjugate()
+    way, first, last = travel * back, start * back, end * back
+    if any(abs(along.imag) > IN_LINE * abs(along) for along in (way, first, last)):
+        return None
+    return _on_line(direction, way.real, first.real, last.real)
 
 
-def stop_and_go(travel: Vector, start: Vector, end: Vector) -> list[Arc]:
+def stop_and_go(travel: complex, start: complex, end: complex) -> list[Arc]:
     """Brake, go straight to where a straight run-up begins, run up: slow, but it exists always."""
-    brake, run_up = ramp_between(start, (0.0, 0.0)), ramp_between((0.0, 0.0), end)
-    x = travel[0] - (start[0] * brake.duration + end[0] * run_up.duration) / 2
-    y = travel[1] - (start[1] * brake.duration + end[1] * run_up.duration) / 2
-    way = math.hypot(x, y)
-    line = _on_line((x / way, y / way), way, 0.0, 0.0) if way else []
+    brake, run_up = ramp_between(start, 0j), ramp_between(0j, end)
+    left = travel - (start * brake.duration + end * run_up.duration) / 2
+    way = abs(left)
+    line = _on_line(left / way, way, 0.0, 0.0) if way else []
     return [brake, *line, run_up]
 
 
-def _on_line(direction: Vector, travel: float, start: float, end: float) -> list[Arc]:
-    x, y = direction
+def _on_line(direction: complex, travel: float, start: float, end: float) -> list[Arc]:
     arcs: list[Arc] = []
     speed = start
     for duration, rate in fastest(travel, start, end, 1.0, 1.0).pieces:
-        arcs.append(Ramp(duration, (speed * x, speed * y), (rate * x, rate * y)))
+        arcs.append(Ramp(duration, speed * direction, rate * direction))
         speed += rate * duration
     return arcs

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final
+from bisect import bisect_right
+from typing import Final, NamedTuple
 
-from daemon.loops.planner_arcs import Arc, Place, Ramp, Vector, ramp_between
+from daemon.loops.planner_arcs import Chain, Place, Ramp, chain, ramp_between
 from daemon.loops.planner_paths import fastest_way, stop_and_go
 
 AT_ONCE: Final = 1e-9
@@ -17,57 +16,47 @@ GENTLEST: Final = 1e-12
 """Smallest part of the acceleration that is tried to make a way last longer."""
 
 
-@dataclass(frozen=True, slots=True)
-class Way:
+class Way(NamedTuple):
     """Arcs one after the other.
 
     Attributes:
         shape: what the arcs are together.
         speed: limit in force [m/s].
         acceleration: limit in force [m/s2].
-        arcs: in units of the limits.
-        places: displacement and velocity at the start of each arc and at the end of the last, in the same units.
-        times: of the places [s].
+        chain: the arcs, in units of the limits.
+        duration: [s].
     """
 
     shape: str
     speed: float
     acceleration: float
-    arcs: tuple[Arc, ...]
-    places: tuple[Place, ...]
-    times: tuple[float, ...]
-
-    @property
-    def duration(self) -> float:
-        return self.times[-1]
+    chain: Chain
+    duration: float
 
     def case(self, time: float) -> str:
         """Name of the arc in force."""
-        index = self._index(time)
-        return self.arcs[index].case if index < len(self.arcs) else "end"
+        index = self._index(time * self.acceleration / self.speed)
+        return self.chain.arcs[index].case if index < len(self.chain.arcs) else "end"
 
     def at(self, time: float) -> Place:
         """Displacement [m] and velocity [m/s] at a time [s]; after the end the last velocity is held."""
-        index = self._index(time)
-        x, y, vx, vy = self.places[index]
-        unit = self.speed / self.acceleration
-        since = (time - self.times[index]) / unit
-        if index < len(self.arcs):
-            dx, dy, vx, vy = self.arcs[index].at(since)
+        _, speed, acceleration, (arcs, places, times), _ = self
+        now = time * acceleration / speed
+        index = self._index(now)
+        displacement, velocity = places[index]
+        since = now - times[index]
+        if index < len(arcs):
+            further, velocity = arcs[index].at(since)
         else:
-            dx, dy = vx * since, vy * since
-        length = self.speed * unit
-        return (x + dx) * length, (y + dy) * length, vx * self.speed, vy * self.speed
+            further = velocity * since
+        return (displacement + further) * (speed * speed / acceleration), velocity * speed
 
     def _index(self, time: float) -> int:
-        last = len(self.arcs)
-        for index in range(last):
-            if time < self.times[index + 1]:
-                return index
-        return last
+        """Of the arc at a time in units of the limits."""
+        return bisect_right(self.chain.times, time, 1) - 1
 
 
-def fastest(travel: Vector, start: Vector, end: Vector, speed: float, acceleration: float, near: float = 0.0) -> Way:
+def fastest(travel: complex, start: complex, end: complex, speed: float, acceleration: float, near: float = 0.0) -> Way:
     """The fastest way; a start above the speed limit is braked to it first, straight.
 
     Args:
@@ -79,25 +68,23 @@ def fastest(travel: Vector, start: Vector, end: Vector, speed: float, accelerati
         near: a straight change of velocity that ends as near to the goal as this [m] is taken as the way.
     """
     length = speed * speed / acceleration
-    x, y = travel[0] / length, travel[1] / length
-    begin, final = _within(start, speed), _within(end, speed)
-    raw = start[0] / speed, start[1] / speed
+    goal, raw = travel / length, start / speed
+    begin, final = _within(raw), _within(end / speed)
     if begin == raw:
-        shape, arcs = fastest_way((x, y), begin, final, near / length)
-        return _way(shape, speed, acceleration, raw, arcs)
+        return _way(*fastest_way(goal, begin, final, near / length), speed, acceleration)
     slowing = ramp_between(raw, begin)
-    dx, dy, _, _ = slowing.at(slowing.duration)
-    shape, arcs = fastest_way((x - dx, y - dy), begin, final, near / length)
-    return _way(shape, speed, acceleration, raw, [slowing, *arcs])
+    braked, _ = slowing.at(slowing.duration)
+    shape, onward = fastest_way(goal - braked, begin, final, near / length)
+    return _way(shape, chain(raw, [slowing, *onward.arcs]), speed, acceleration)
 
 
-def braking(start: Vector, speed: float, acceleration: float) -> Way:
+def braking(start: complex, speed: float, acceleration: float) -> Way:
     """The straight way to rest."""
-    raw = start[0] / speed, start[1] / speed
-    return _way("stop", speed, acceleration, raw, [ramp_between(raw, (0.0, 0.0))])
+    raw = start / speed
+    return _way("stop", chain(raw, [ramp_between(raw, 0j)]), speed, acceleration)
 
 
-def lasting(way: Way, travel: Vector, start: Vector, end: Vector, duration: float) -> Way:
+def lasting(way: Way, travel: complex, start: complex, end: complex, duration: float) -> Way:
     """The way with an acceleration so low that it lasts as long as asked for, or the next longer duration there is.
 
     Regula falsi on the logarithms of acceleration and duration; every third trial halves, as the duration may jump.
@@ -125,32 +112,21 @@ def lasting(way: Way, travel: Vector, start: Vector, end: Vector, duration: floa
     return slow
 
 
-def _with_a_rest(way: Way, travel: Vector, start: Vector, end: Vector, duration: float) -> Way:
+def _with_a_rest(way: Way, travel: complex, start: complex, end: complex, duration: float) -> Way:
     """Brake, rest, go: for a way that hardly has to change, which no acceleration makes last."""
     speed, acceleration = way.speed, way.acceleration
-    length = speed * speed / acceleration
-    raw = start[0] / speed, start[1] / speed
-    brake, *onward = stop_and_go((travel[0] / length, travel[1] / length), raw, (end[0] / speed, end[1] / speed))
+    raw = start / speed
+    brake, *onward = stop_and_go(travel * acceleration / (speed * speed), raw, end / speed)
     unrested = math.fsum(arc.duration for arc in (brake, *onward))
-    rest = Ramp(max(0.0, duration * acceleration / speed - unrested), (0.0, 0.0))
-    return _way("stop and go", speed, acceleration, raw, [brake, rest, *onward])
+    rest = Ramp(max(0.0, duration * acceleration / speed - unrested), 0j)
+    return _way("stop and go", chain(raw, [brake, rest, *onward]), speed, acceleration)
 
 
-def _within(velocity: Vector, speed: float) -> Vector:
+def _within(velocity: complex) -> complex:
     """The velocity in units of the limit, shortened to the limit."""
-    x, y = velocity[0] / speed, velocity[1] / speed
-    length = math.hypot(x, y)
-    return (x / length, y / length) if length > 1 else (x, y)
+    length = abs(velocity)
+    return velocity / length if length > 1 else velocity
 
 
-def _way(shape: str, speed: float, acceleration: float, velocity: Vector, arcs: Sequence[Arc]) -> Way:
-    lasting_arcs = tuple(arc for arc in arcs if arc.duration > 0)
-    x = y = time = 0.0
-    vx, vy = velocity
-    places, times = [(x, y, vx, vy)], [time]
-    for arc in lasting_arcs:
-        dx, dy, vx, vy = arc.at(arc.duration)
-        x, y, time = x + dx, y + dy, time + arc.duration
-        places.append((x, y, vx, vy))
-        times.append(time * speed / acceleration)
-    return Way(shape, speed, acceleration, lasting_arcs, tuple(places), tuple(times))
+def _way(shape: str, arcs: Chain, speed: float, acceleration: float) -> Way:
+    return Way(shape, speed, acceleration, arcs, arcs.duration * speed / acceleration)
