@@ -1,0 +1,38 @@
+"""The part of a profile about gamepads."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from canhelm.errors import ConfigError
+from profiles.gamepad import StickConfig
+from profiles.loader import load
+
+
+def loaded(folder: Path, text: str) -> Path:
+    path = folder / "mine.yaml"
+    path.write_text(f"schema_version: 1\nextends: robots/turtle\ngamepad: {text}\n")
+    return path
+
+
+def test_what_a_profile_leaves_out_is_that_of_a_usual_pad(tmp_path: Path) -> None:
+    gamepad = load(loaded(tmp_path, "{dead_man: BTN_TR, speed: {axis: ABS_RY}}")).profile.gamepad
+    assert (gamepad.dead_man, gamepad.speed) == ("BTN_TR", StickConfig(axis="ABS_RY"))
+    assert gamepad.yaw_rate == StickConfig(axis="ABS_RX")
+
+
+def test_a_command_or_a_button_can_be_left_without_any(tmp_path: Path) -> None:
+    gamepad = load(loaded(tmp_path, "{sideways: null, emergency_stop: null, silence_s: null}")).profile.gamepad
+    assert (gamepad.sideways, gamepad.emergency_stop, gamepad.silence_s) == (None, None, None)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["{dead_man: BTN_LEFT_PADDLE}", "{speed: {axis: ABS_Q}}", "{speed: {axis: ABS_X, dead_zone: 1.0}}", "{speed: {}}",
+     "{dead_man: null}", "{speed: {axis: ABS_X, sign: 0}}", "{silence_s: 0}"],
+)  # fmt: skip
+def test_what_makes_no_sense_is_refused_with_its_line(tmp_path: Path, text: str) -> None:
+    with pytest.raises(ConfigError, match=r"mine\.yaml:3"):
+        load(loaded(tmp_path, text))
