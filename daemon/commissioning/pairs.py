@@ -6,7 +6,7 @@ brake is wired: to which output, and with which polarity.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -52,28 +52,29 @@ async def push_pairs(daemon: Daemon, person: Person, geometry: PairedSteerGeomet
 
 
 async def _push(daemon: Daemon, person: Person, pair: str, released: str) -> Push:
-    before = await _headings_deg(daemon)
+    before = await headings_deg(daemon)
     moved = await agrees(person, f"push the {pair} pair to the left by hand, about 20 degrees: does it turn?")
-    after = await _headings_deg(daemon)
+    after = await headings_deg(daemon)
     if moved:
         await person.ask(f"turn the {pair} pair back straight ahead, then press Enter")
     return Push(pair, released, moved, {name: angle - before[name] for name, angle in after.items()})
 
 
-async def turn_axes(daemon: Daemon, person: Person, encoders: Mapping[str, EncoderConfig]) -> list[Push]:
-    """Axes without brakes of their own, each turned by hand, as of a steered axle. Raises CanhelmError, EOFError."""
+async def turn_axes(daemon: Daemon, person: Person, encoders: Iterable[str]) -> list[Push]:
+    """Axes without brakes of their own, each turned by hand, as that of a trailer. Raises CanhelmError, EOFError."""
     pushes = []
     for name in encoders:
-        before = await _headings_deg(daemon)
+        before = await headings_deg(daemon)
         await person.ask(f"turn the axis of encoder {name} to the left by hand, about 20 degrees; then press Enter")
-        after = await _headings_deg(daemon)
+        after = await headings_deg(daemon)
         await person.ask(f"turn the axis of encoder {name} back straight ahead, then press Enter")
         turned = {encoder: angle - before[encoder] for encoder, angle in after.items()}
         pushes.append(Push(name, LOCKED, moved=True, turned_deg=turned))
     return pushes
 
 
-async def _headings_deg(daemon: Daemon) -> dict[str, float]:
+async def headings_deg(daemon: Daemon) -> dict[str, float]:
+    """What each encoder tells, by name."""
     nodes = (await daemon.call("status"))["nodes"]
     return {node["name"]: float(node["sensed_deg"]) for node in nodes if "sensed_deg" in node}
 
@@ -121,10 +122,9 @@ WIRINGS = {
     (True, True, False): Wiring(own=False, reversed=True),
 }
 """By what gave way: with all locked, with its own brake released, with the other one released."""
-DEAD = {
-    (False, False, False): "never releases: check its supply, its cable and the output",
-    (True, True, True): "never locks: check its supply, its cable and the output",
-}
+NEVER_RELEASES = "never releases: check its supply, its cable and the output"
+NEVER_LOCKS = "never locks: check its supply, its cable and the output"
+DEAD = {(False, False, False): NEVER_RELEASES, (True, True, True): NEVER_LOCKS}
 
 
 def judge_brakes(pushes: Sequence[Push], profile: Profile, findings: Findings) -> None:

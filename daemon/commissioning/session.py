@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager
+from functools import partial
 from typing import Any
 
 from canhelm.errors import CanhelmError, NodeAbsent, Refused
 from daemon.commissioning.dialogue import Daemon, Person, agrees, preview, told
-from daemon.commissioning.pairs import follow_swapped_wheels, judge_brakes, judge_encoders, push_pairs, turn_axes
-from daemon.commissioning.wheels import Findings, Values, look_at_wheels
+from daemon.commissioning.holding import holding_brakes, look_at_holding_brake
+from daemon.commissioning.pairs import Push, follow_swapped_wheels, judge_brakes, judge_encoders, push_pairs, turn_axes
+from daemon.commissioning.steered import judge_axle, look_at_axle, steered_axle
+from daemon.commissioning.wheels import Findings, Values, look_at_wheels, tried
 from profiles.schema import DriveConfig, PairedSteerGeometry, Profile
+from profiles.steered import SteeredAxle
 
 ALL, PAIRS = "all", "pairs"
 LIMITS = ("continuous_current_limit", "output_current_limit")
@@ -27,15 +31,21 @@ def wheels_of(profile: Profile) -> dict[str, DriveConfig]:
 
 
 def chosen_wheels(profile: Profile, what: str) -> list[str]:
-    """The drives that a person means: a name, a node id, or all. Raises NodeAbsent."""
-    wheels = wheels_of(profile)
+    """The wheels' drives that a person means: a name, a node id, or all. Raises NodeAbsent."""
+    wheels, axle = wheels_of(profile), steered_axle(profile)
     if what == ALL:
         return list(wheels)
     chosen = [name for name, config in wheels.items() if what in (name, str(config.node))]
-    if not chosen and what != PAIRS:
-        have = ", ".join(wheels)
+    if not chosen and what != PAIRS and not chosen_axle(profile, what):
+        have = ", ".join([*wheels, axle.drive] if axle else wheels)
         raise NodeAbsent(f"no wheel {what} in this profile", remedy=f"give one of {have}, or pairs, or all")
     return chosen
+
+
+def chosen_axle(profile: Profile, what: str) -> SteeredAxle | None:
+    """The steered axle, where there is one and a person means it."""
+    axle = steered_axle(profile)
+    return axle if axle and what in (ALL, PAIRS, axle.drive, str(profile.drives[axle.drive].node)) else None
 
 
 async def commission(daemon: Daemon, person: Person, profile: Profile, what: str, current_ma: int) -> Findings:
@@ -50,18 +60,27 @@ async def commission(daemon: Daemon, person: Person, profile: Profile, what: str
 
     Raises:
         GivenUp: the person has said no; nothing is changed.
+        Refused: the robot has motors at an NXT brick.
         EOFError: nobody is there any more; nothing is changed.
         CanhelmError: the daemon refuses, or a brake does not switch.
     """
+    if profile.bricks:
+        remedy = "try each by `canhelm motor velocity NAME RPM --duration 1`; where all are right, write setup: done"
+        raise Refused("motors at an NXT brick are not looked at", remedy=remedy)
     findings, chosen = Findings(), chosen_wheels(profile, what)
     if not await agrees(person, "do all wheels hang in the air, and is everybody clear of them?"):
         raise GivenUp("nothing was changed", remedy="lift the robot first")
     try:
         await daemon.call("brake.engage", pair=ALL)
-        async with capped(daemon, person, chosen, current_ma):
-            await look_at_wheels(daemon, person, chosen, wheels_of(profile), findings)
+        if not await _holding_brakes_work(daemon, person, profile, chosen, findings):
+            return findings
+        axle = chosen_axle(profile, what)
+        async with capped(daemon, person, [*chosen, axle.drive] if axle else chosen, current_ma):
+            await look_at_wheels(daemon, person, chosen, wheels_of(profile), _holding(profile), findings)
+            pushes = await _steer(daemon, person, profile, axle, findings) if axle else []
         if what in (ALL, PAIRS):
-            await _look_at_pairs(daemon, person, profile, findings)
+            pushes += await _push(daemon, person, profile, findings)
+        judge_encoders(pushes, profile.encoders, findings)
     finally:
         await daemon.call("stop")
         await daemon.call("brake.engage", pair=ALL)
@@ -73,13 +92,41 @@ async def commission(daemon: Daemon, person: Person, profile: Profile, what: str
     return findings
 
 
-async def _look_at_pairs(daemon: Daemon, person: Person, profile: Profile, findings: Findings) -> None:
+def _holding(profile: Profile) -> dict[str, list[str]]:
+    """Names of the holding brakes, by their drives."""
+    brakes = holding_brakes(profile, list(profile.drives))
+    return {drive: [name for name, brake in brakes.items() if brake.drive == drive] for drive in profile.drives}
+
+
+async def _holding_brakes_work(
+    daemon: Daemon, person: Person, profile: Profile, drives: list[str], findings: Findings
+) -> bool:
+    """Whether the holding brakes obey as the profile says; with one that does not, its motor is not to be turned."""
+    for name, brake in holding_brakes(profile, drives).items():
+        await look_at_holding_brake(daemon, person, name, brake, findings)
+    if findings.wrong or findings.unsolved:
+        person.tell("the wheels are not looked at before the holding brakes are right: then begin again")
+        return False
+    return True
+
+
+async def _steer(daemon: Daemon, person: Person, profile: Profile, axle: SteeredAxle, findings: Findings) -> list[Push]:
+    """What the encoders tell of the steered axle, where it turns."""
+    config = profile.drives[axle.drive]
+    look = partial(look_at_axle, daemon, person, axle, config)
+    seen = await tried(daemon, person, axle.drive, findings, look)
+    push = judge_axle(seen, axle, config, findings) if seen else None
+    return [push] if push else []
+
+
+async def _push(daemon: Daemon, person: Person, profile: Profile, findings: Findings) -> list[Push]:
+    """What the encoders tell of pairs that are pushed, and of axes that no motor of theirs turns."""
     if isinstance(profile.vehicle, PairedSteerGeometry):
         pushes = await push_pairs(daemon, person, profile.vehicle)
         judge_brakes(pushes, profile, findings)
-    else:
-        pushes = await turn_axes(daemon, person, profile.encoders)
-    judge_encoders(pushes, profile.encoders, findings)
+        return pushes
+    axle = steered_axle(profile)
+    return await turn_axes(daemon, person, [name for name in profile.encoders if axle is None or name != axle.encoder])
 
 
 @asynccontextmanager

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from functools import partial
+from typing import Any, TypeVar
 
 import msgspec
 
@@ -13,6 +14,7 @@ from canhelm.errors import CanhelmError
 from daemon.commissioning.dialogue import Daemon, Person, agrees, number, told
 from profiles.schema import DriveConfig
 
+T = TypeVar("T")
 JOG_M_S = 0.1
 JOG_S = 2.0
 LEAST_SHARE = 0.2
@@ -79,21 +81,45 @@ def seen_wheel(answer: str, commanded: str, wheels: Mapping[str, DriveConfig]) -
     return wheel, way == "forward"
 
 
-async def look_at_wheel(daemon: Daemon, person: Person, drive: str, wheels: Mapping[str, DriveConfig]) -> Seen:
+async def jog(daemon: Daemon, drive: str, config: DriveConfig, speed_m_s: float, brakes: Sequence[str] = ()) -> float:
+    """Turn one drive for a while; how far it has turned by its own counts [m at the wheel's rim].
+
+    Args:
+        brakes: holding brakes of the drive, which are released meanwhile.
+
+    Raises:
+        CanhelmError: it does not turn, or a brake does not switch.
+    """
+    if brakes:
+        await daemon.call("motor.enable", node=drive)
+        for brake in brakes:
+            await daemon.call("brake.release", pair=brake)
+    before = await _position_qc(daemon, drive)
+    await daemon.call("motor.velocity", node=drive, wheel_speed_m_s=speed_m_s, duration_s=JOG_S)
+    way_m = abs(await _position_qc(daemon, drive) - before) * _m_per_qc(config)
+    if brakes:
+        await daemon.call("motor.disable", node=drive)
+    return way_m
+
+
+async def look_at_wheel(
+    daemon: Daemon, person: Person, drive: str, wheels: Mapping[str, DriveConfig], brakes: Sequence[str] = ()
+) -> Seen:
     """Jog one drive, ask what turned, and let the person turn it once by hand. Raises CanhelmError, EOFError."""
     config = wheels[drive]
     speed = min(JOG_M_S, config.max_speed_m_s)
     await person.ask(f"{drive} (node {config.node}) turns for {JOG_S:g} s as if forward; press Enter and watch")
-    before = await _position_qc(daemon, drive)
-    await daemon.call("motor.velocity", node=drive, wheel_speed_m_s=speed, duration_s=JOG_S)
-    way_m = abs(await _position_qc(daemon, drive) - before) * _m_per_qc(config)
-    moved = way_m > LEAST_SHARE * speed * JOG_S
+    moved = await jog(daemon, drive, config, speed, brakes) > LEAST_SHARE * speed * JOG_S
     while (answer := seen_wheel(await person.ask(QUESTION), drive, wheels)) is None:
         person.tell(f"wheels are {', '.join(wheels)}; say for instance `forward`, or `{next(iter(wheels))} backward`")
     wheel, forward = answer
     if not wheel or not moved:
         return Seen(drive, wheel, forward, moved)
+    for brake in brakes:
+        await daemon.call("brake.release", pair=brake, force=True)
     turn_qc = await _turned_by_hand(daemon, person, drive, wheel, _expected_qc(wheels[wheel]))
+    for brake in brakes:
+        await daemon.call("brake.engage", pair=brake)
     fitted, pulses = wheels[wheel], wheels[wheel].encoder_pulses_per_turn
     if turn_qc and not _fits(turn_qc, fitted, pulses):
         person.tell(f"{abs(turn_qc)} counts a turn of {wheel}, and the profile says {_expected_qc(fitted):.0f}")
@@ -183,12 +209,24 @@ def _judge_size(seen: Seen, config: DriveConfig, findings: Findings) -> None:
 
 
 async def look_at_wheels(
-    daemon: Daemon, person: Person, chosen: list[str], wheels: Mapping[str, DriveConfig], findings: Findings
+    daemon: Daemon,
+    person: Person,
+    chosen: Sequence[str],
+    wheels: Mapping[str, DriveConfig],
+    brakes: Mapping[str, Sequence[str]],
+    findings: Findings,
 ) -> None:
-    """One drive after the other; one that fails is tried again if the person wants to. Raises EOFError."""
+    """One drive after the other; one that fails is tried again if the person wants to. Raises EOFError.
+
+    Args:
+        chosen: the drives.
+        wheels: all drives that turn wheels.
+        brakes: names of the holding brakes, by their drives.
+    """
     turned: dict[str, str] = {}
     for drive in chosen:
-        seen = await _try(daemon, person, drive, wheels, findings)
+        held = brakes.get(drive, ())
+        seen = await tried(daemon, person, drive, findings, partial(look_at_wheel, daemon, person, drive, wheels, held))
         if seen is None:
             continue
         if seen.wheel and turned.setdefault(seen.wheel, drive) != drive:
@@ -196,13 +234,13 @@ async def look_at_wheels(
         judge_wheel(seen, wheels, findings)
 
 
-async def _try(
-    daemon: Daemon, person: Person, drive: str, wheels: Mapping[str, DriveConfig], findings: Findings
-) -> Seen | None:
+async def tried(
+    daemon: Daemon, person: Person, drive: str, findings: Findings, look: Callable[[], Awaitable[T]]
+) -> T | None:
     """What was seen of a drive; None where it fails and the person gives it up."""
     while True:
         try:
-            return await look_at_wheel(daemon, person, drive, wheels)
+            return await look()
         except CanhelmError as error:
             person.tell(f"{drive}: {told(error)}")
             await daemon.call("reset")

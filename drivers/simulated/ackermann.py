@@ -202,6 +202,10 @@ class AckermannWorld(BodyWorld):
         front_left.point(atan2(length * s, length * c - aside))
         front_right.point(atan2(length * s, length * c + aside))
 
+    def _step_in_air(self) -> None:
+        super()._step_in_air()
+        self.steering.follow(self._step_s)
+
     def _motions(self) -> tuple[float, ...]:
         return (*super()._motions(), self._free[0].rim_m_s, self._free[1].rim_m_s)
 

@@ -165,11 +165,11 @@ class BodyWorld(ABC):
         return self._drives[list(self.axes).index(drive)].wheel_rad
 
     def _step_in_air(self) -> None:
-        """Turn the wheels for one step, each for itself; a hand gives way to a motor that has current."""
+        """Turn the wheels for one step, each for itself; a hand gives way to a brake and to a motor with current."""
         dt = self._step_s
         for drive in self._drives:
             left = self.hands.pop(drive, 0.0)
-            if not left or drive.demand_a:
+            if not left or drive.demand_a or drive.braked:
                 drive.turn(0.0, 0.0, dt)
                 continue
             step = min(max(left, -HAND_RAD_S * dt), HAND_RAD_S * dt)

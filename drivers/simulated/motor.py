@@ -46,6 +46,7 @@ class WheelDrive:
         "_torque_constant",
         "_wheel_torque_per_a",
         "axis",
+        "braked",
         "demand_a",
         "rim_m_s",
         "wheel_rad_s",
@@ -68,6 +69,7 @@ class WheelDrive:
         self._friction_n_m = ratio * motor.torque_constant_n_m_a * motor.no_load_current_a
         self._brake_n_m = simulation.brake_holding_torque_n_m
         self._dry_n_m = self._friction_n_m
+        self.braked = False
         self._rolling_m = simulation.tyre.rolling_resistance * config.wheel_radius_m
         self._forward_loss = 1.0 - config.gear_efficiency
         self._back_loss = 1.0 / config.gear_efficiency - 1.0
@@ -139,6 +141,7 @@ class WheelDrive:
 
     def set_brake(self, engaged: bool) -> None:
         """Engage or release a holding brake on the wheel."""
+        self.braked = engaged
         self._dry_n_m = self._friction_n_m + (self._brake_n_m if engaged else 0.0)
 
     def stop(self) -> None:

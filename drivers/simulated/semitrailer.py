@@ -216,6 +216,10 @@ class SemitrailerWorld(BodyWorld):
 
     # --- rest --------------------------------------------------------------------------------------------------
 
+    def _step_in_air(self) -> None:
+        super()._step_in_air()
+        self.steering.follow(self._step_s)
+
     def _motions(self) -> tuple[float, ...]:
         return (*super()._motions(), self._trailer_rate)
 

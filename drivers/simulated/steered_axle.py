@@ -50,6 +50,10 @@ class SimulatedSteering:
     def turn(self, dt_s: float) -> None:
         """Turn for one step."""
         self.drive.turn(0.0, 0.0, dt_s)
+        self.follow(dt_s)
+
+    def follow(self, dt_s: float) -> None:
+        """Go with the drive for one step, up to the stops."""
         angle = self.angle_rad + self.drive.wheel_rad_s * dt_s
         if -self._stop_rad <= angle <= self._stop_rad:
             self.angle_rad = angle

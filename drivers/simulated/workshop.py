@@ -11,6 +11,7 @@ from drivers.simulated.max2d import Max2dWorld
 from drivers.simulated.network import SimulatedNetwork
 from drivers.simulated.world import STEP_S
 from profiles.schema import PairedSteerGeometry, Profile
+from profiles.steered import CarGeometry, SemitrailerGeometry
 
 
 class Workshop:
@@ -37,6 +38,14 @@ class Workshop:
         if not isinstance(vehicle, PairedSteerGeometry):
             return {}
         return dict(zip(vehicle.encoders, vehicle.brakes, strict=True))
+
+    @property
+    def _headings(self) -> tuple[str, ...]:
+        """Encoders of what can be seen to turn: wheel pairs, a steered axle, a trailer."""
+        vehicle = self._profile.vehicle
+        if isinstance(vehicle, SemitrailerGeometry):
+            return vehicle.steering.encoder, vehicle.trailer.encoder
+        return (vehicle.steering.encoder,) if isinstance(vehicle, CarGeometry) else tuple(self._pairs)
 
     def lift(self, lifted: bool) -> None:
         """Put the robot onto blocks, or down again."""
@@ -72,7 +81,7 @@ class Workshop:
         return degrees(world.heading_rad(name) - before)
 
     def look(self) -> dict[str, Any]:
-        """What can be seen: where the robot stands, wheels' angles, headings of the pairs, positions of the brakes."""
+        """What can be seen: where the robot stands, angles of wheels, headings of pairs and axles, brakes."""
         self._now()
         world = self._network.world
         x_m, y_m, yaw_rad = world.pose
@@ -80,7 +89,7 @@ class Workshop:
             "stands": {"x_m": round(x_m, 3), "y_m": round(y_m, 3), "yaw_deg": round(degrees(yaw_rad), 2)},
             "lifted": world.lifted,
             "wheel_deg": {name: round(degrees(world.wheel_rad(name)), 2) for name in world.axes},
-            "heading_deg": {name: round(degrees(world.heading_rad(name)), 2) for name in self._pairs},
+            "heading_deg": {name: round(degrees(world.heading_rad(name)), 2) for name in self._headings},
             "brakes_engaged": {name: brake.engaged for name, brake in self._network.brakes.items()},
         }
 

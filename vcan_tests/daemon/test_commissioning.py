@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from canhelm.errors import Interlock
+from canhelm.errors import Interlock, Refused
 from daemon.app import App
 from daemon.commissioning.pairs import LOCKED, WIRINGS, Push, judge_brakes, judge_encoders
 from daemon.commissioning.session import GivenUp, changes_of, commission
@@ -133,15 +133,82 @@ async def test_a_robot_that_is_built_as_its_profile_says_changes_nothing(tmp_pat
         assert changes_of(shop.profile, findings.values) == {"setup": ("needed", "done")}
 
 
-async def test_an_axle_that_a_motor_steers_is_held_against_its_encoder(tmp_path: Path) -> None:
-    for name, more in (("mine", ""), ("built", "encoders: {steering_angle: {direction: -1}}\n")):
-        (tmp_path / name).mkdir()
-        text = "schema_version: 1\nname: lab1\nextends: robots/ackermann\n"
-        (tmp_path / name / "lab1.yaml").write_text(text + more)
-    async with workshop(tmp_path / "mine" / "lab1.yaml", tmp_path / "built" / "lab1.yaml") as shop:
+STEERED = {
+    "encoder reversed": (
+        "encoders: {steering_angle: {direction: -1}}",
+        "reversed: the encoder of the steering_angle pair counts the other way",
+    ),
+    "motor reversed": ("drives: {steering: {direction: -1}}", "reversed: steering steers to the right"),
+    "wrong gear": ("drives: {steering: {belt_ratio: 1.5}}", "gear: steering has"),
+    "as it should be": ("", ""),
+}
+"""How a steered axle may be built otherwise than its profile says, and by which name it is found."""
+
+
+def steered_robot(folder: Path, robot: str, text: str) -> Path:
+    """A profile that extends one with a steered axle."""
+    folder.mkdir()
+    file = folder / "lab1.yaml"
+    file.write_text(f"schema_version: 1\nname: lab1\nextends: robots/{robot}\nsetup: needed\n{text}\n")
+    return file
+
+
+@pytest.mark.parametrize("robot", ["ackermann", "semitrailer"])
+@pytest.mark.parametrize("fault", STEERED)
+async def test_an_axle_that_a_motor_steers_is_found_and_put_right(fault: str, robot: str, tmp_path: Path) -> None:
+    text, words = STEERED[fault]
+    mine, built = steered_robot(tmp_path / "mine", robot, ""), steered_robot(tmp_path / "built", robot, text)
+    async with workshop(mine, built) as shop:
         findings = await shop.commission()
-    assert findings.wrong == ["reversed: the encoder of the steering_angle pair counts the other way"]
-    assert findings.values == {("encoders", "steering_angle", "direction"): -1, ("setup",): "done"}
+    assert findings.unsolved == []
+    assert all(words in sentence for sentence in findings.wrong), findings.wrong
+    assert len(findings.wrong) == bool(words)
+    write_values(mine, findings.values)
+    found, true = load(mine).profile, load(built).profile
+    assert found.setup == "done"
+    assert found.encoders == true.encoders
+    assert found.drives["steering"].direction == true.drives["steering"].direction
+    assert found.drives["steering"].total_ratio == pytest.approx(true.drives["steering"].total_ratio, rel=0.05)
+
+
+async def test_the_steered_axle_can_be_looked_at_alone(tmp_path: Path) -> None:
+    async with workshop(steered_robot(tmp_path / "mine", "ackermann", "")) as shop:
+        findings = await shop.commission("steering")
+        assert (findings.wrong, findings.unsolved, findings.values) == ([], [], {})
+        assert not any(heard.startswith("turn wheel") for heard in shop.person.heard)
+
+
+HELD = """
+brakes:
+  parking: {kind: holding, drive: rear_left, output: 3, output_bit: 13, open_time_s: 0.03, close_time_s: 0.02}
+"""
+
+
+async def test_a_wheel_with_a_holding_brake_is_looked_at_with_the_brake_released(tmp_path: Path) -> None:
+    async with workshop(robot_file(tmp_path, HELD)) as shop:
+        findings = await shop.commission("rear_left")
+        assert (findings.wrong, findings.unsolved, findings.values) == ([], [], {})
+        assert shop.robot.network.brakes["parking"].engaged
+
+
+async def test_a_holding_brake_that_is_wired_the_other_way_round_is_found_before_its_motor_turns(
+    tmp_path: Path,
+) -> None:
+    mine = robot_file(tmp_path / "mine", HELD)
+    built = robot_file(tmp_path / "built", HELD.replace("output: 3", "energise_to_release: false, output: 3"))
+    async with workshop(mine, built) as shop:
+        findings = await shop.commission()
+    assert findings.wrong == ["reversed: the parking brake releases when it shall lock"]
+    assert findings.values == {("brakes", "parking", "energise_to_release"): False}
+
+
+async def test_motors_at_a_brick_are_not_looked_at_and_that_is_told(tmp_path: Path) -> None:
+    file = tmp_path / "lab1.yaml"
+    file.write_text("schema_version: 1\nname: lab1\nextends: robots/nxt\nsetup: needed\n")
+    async with workshop(file) as shop:
+        with pytest.raises(Refused, match="at an NXT brick") as refusal:
+            await shop.commission()
+        assert "write setup: done" in str(refusal.value.remedy)
 
 
 async def test_a_robot_is_not_driven_before_its_setup(tmp_path: Path) -> None:

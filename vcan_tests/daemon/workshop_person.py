@@ -44,6 +44,8 @@ class WorkshopPerson:
         self.heard.append(question)
         if question.startswith("which wheel"):
             return await self._what_turned()
+        if question.startswith("where do the steered wheels"):
+            return await self._where_it_points()
         if question.startswith("turn wheel"):
             return await self._turn_once(question.split()[2])
         if pushed := re.match(r"push the (\w+) pair", question):
@@ -61,10 +63,14 @@ class WorkshopPerson:
             return str(self.labels.get(self._wheel, ""))
         elif question.startswith("diameter"):
             return str(self.diameters.get(self._wheel, ""))
+        elif held := re.match(r"the (\w+) brake is (locked|released): does (\w+) turn", question):
+            given = await self._call("simulation.hand", name=held[3], angle_deg=30.0)
+            return "y" if given["turned_deg"] else "n"
         elif question.endswith("[y/n]"):
             return "y"
         elif "press Enter and watch" in question:
-            self._before = (await self._call("simulation.look"))["wheel_deg"]
+            seen = await self._call("simulation.look")
+            self._before = seen["wheel_deg"] | seen["heading_deg"]
         return ""
 
     async def _what_turned(self) -> str:
@@ -74,6 +80,12 @@ class WorkshopPerson:
         if abs(turned[name]) < SEEN_DEG:
             return "none"
         return f"{name} {'forward' if turned[name] > 0 else 'backward'}"
+
+    async def _where_it_points(self) -> str:
+        now = (await self._call("simulation.look"))["heading_deg"]
+        axle = next(iter(now))
+        turned = now[axle] - self._before[axle]
+        return "none" if abs(turned) < SEEN_DEG else "left" if turned > 0 else "right"
 
     async def _turn_once(self, wheel: str) -> str:
         self._wheel = wheel
