@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Mapping, Sequence
+import asyncio
+from collections.abc import AsyncIterator, Coroutine, Mapping, Sequence
 from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any
@@ -82,8 +83,7 @@ async def commission(daemon: Daemon, person: Person, profile: Profile, what: str
             pushes += await _push(daemon, person, profile, findings)
         judge_encoders(pushes, profile.encoders, findings)
     finally:
-        await daemon.call("stop")
-        await daemon.call("brake.engage", pair=ALL)
+        await to_its_end(_leave_safe(daemon))
     follow_swapped_wheels(profile, findings)
     if what != ALL and any(part == "drives" and keys[-1:] == ["node"] for part, *keys in findings.values):
         findings.unsolved.append("wheels are swapped: look at all of them, `canhelm setup all`")
@@ -148,12 +148,27 @@ async def capped(daemon: Daemon, person: Person, drives: Sequence[str], current_
             await daemon.call("sdo.write", node=drive, object=name, value=current_ma)
         yield
     finally:
-        await daemon.call("stop")
-        await _put_back(daemon, person, written)
+        await to_its_end(_put_back(daemon, person, written))
+
+
+async def to_its_end(tidying: Coroutine[Any, Any, None]) -> None:
+    """Tidy up, and be cancelled only afterwards: Ctrl-C may come in the middle of it."""
+    task = asyncio.ensure_future(tidying)
+    try:
+        await asyncio.shield(task)
+    except asyncio.CancelledError:
+        await asyncio.wait([task])
+        raise
+
+
+async def _leave_safe(daemon: Daemon) -> None:
+    await daemon.call("stop")
+    await daemon.call("brake.engage", pair=ALL)
 
 
 async def _put_back(daemon: Daemon, person: Person, written: Mapping[tuple[str, str], int]) -> None:
     """One drive that cannot be reached keeps none of the others from getting its limits back."""
+    await daemon.call("stop")
     for (drive, name), old in written.items():
         try:
             await daemon.call("sdo.write", node=drive, object=name, value=old)

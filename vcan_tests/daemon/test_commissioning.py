@@ -254,6 +254,67 @@ async def test_breaking_off_puts_everything_back(tmp_path: Path) -> None:
         assert all(brake.engaged for brake in shop.robot.network.brakes.values())
 
 
+class Interrupted:
+    """A daemon and a person; Ctrl-C comes at a certain step, be it a question or a call that is under way.
+
+    A call that was begun goes on in the daemon, as one does whose client has gone.
+    """
+
+    def __init__(self, shop: Workshop, step: int) -> None:
+        self._shop = shop
+        self._left = step
+        self.begun: list[asyncio.Task[dict[str, Any]]] = []
+        self.working: asyncio.Task[Findings]
+
+    async def call(self, method: str, /, **params: Any) -> dict[str, Any]:
+        self.begun.append(asyncio.create_task(self._shop.call(method, **params)))
+        self._step()
+        return await asyncio.shield(self.begun[-1])
+
+    async def ask(self, question: str) -> str:
+        self._step()
+        await asyncio.sleep(0.0)
+        return await self._shop.person.ask(question)
+
+    def tell(self, text: str) -> None:
+        self._shop.person.tell(text)
+
+    def _step(self) -> None:
+        self._left -= 1
+        if not self._left:
+            self.working.cancel()
+
+
+@pytest.mark.parametrize("what", ["rear_left", "pairs"])
+async def test_ctrl_c_at_any_step_leaves_everything_as_it_was(
+    what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("daemon.commissioning.wheels.JOG_S", 0.2)
+    for room in ("body", "workshop"):
+        monkeypatch.setattr(f"drivers.simulated.{room}.HAND_RAD_S", 100.0)
+    file = robot_file(tmp_path)
+    async with workshop(file) as shop:
+        limits, step = current_limits(shop), 0
+        while True:
+            step += 1
+            steps = Interrupted(shop, step)
+            steps.working = asyncio.create_task(commission(steps, steps, shop.profile, what, 500))
+            await asyncio.wait([steps.working])
+            await asyncio.gather(*steps.begun, return_exceptions=True)
+            assert (step, current_limits(shop), shop.robot.state) == (step, limits, "idle")
+            assert all(brake.engaged for brake in shop.robot.network.brakes.values())
+            if not steps.working.cancelled():
+                break
+        assert step > 15
+    assert not file.with_suffix(".calibration.yaml").exists()
+
+
+def current_limits(shop: Workshop) -> list[int]:
+    """Of all drives [mA]."""
+    names = ("continuous_current_limit", "output_current_limit")
+    return [drive.dictionary.number(name) for drive in shop.robot.network.drives.values() for name in names]
+
+
 @pytest.mark.parametrize(("again", "unsolved"), [("y", 0), ("n", 1)])
 async def test_a_drive_that_faults_is_tried_again_or_left(again: str, unsolved: int, tmp_path: Path) -> None:
     async with workshop(robot_file(tmp_path)) as shop:
