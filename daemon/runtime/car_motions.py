@@ -8,9 +8,8 @@ from typing import Any, Protocol
 from canhelm.errors import DeviceFault
 from daemon.loops.ackermann_drive import CarLaw, CarRecord, CarTarget
 from daemon.loops.measurement import Command, Measurement
-from daemon.loops.path import wrap
 from daemon.loops.truck_odometry import TruckOdometry
-from daemon.runtime.motions import Motion
+from daemon.runtime.motions import Motion, pose_result
 from daemon.runtime.rest import AT_REST_M_S
 from daemon.runtime.streams import Streamed
 
@@ -50,14 +49,13 @@ class CarMotion(Motion):
         self.target: CarTarget | None = target
         self._senses = senses
         self._law = law
-        self._remaining_s = duration_s
+        self._remaining_s = math.inf if duration_s is None else duration_s
         self._last_error_rad = 0.0
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """One step of the law; without a target it brings the car to rest."""
-        if self._remaining_s is not None:
-            self._remaining_s -= dt_s
-        if self.stop_reason or (self._remaining_s is not None and self._remaining_s <= 0.0):
+        self._remaining_s -= dt_s
+        if self.stop_reason or self._remaining_s <= 0.0:
             self.target = None
         command, record = self._law.step(measurement, self._senses.odometry.pose.yaw_rad, self.target, dt_s)
         self.record = record
@@ -75,11 +73,8 @@ class CarMotion(Motion):
         return True
 
     def _result(self, now_s: float) -> dict[str, Any]:
-        pose = self._senses.odometry.pose
         return {
-            "x_m": round(pose.x_m, 4),
-            "y_m": round(pose.y_m, 4),
-            "heading_deg": round(math.degrees(wrap(pose.yaw_rad)), 3),
+            **pose_result(self._senses.odometry.pose),
             "heading_error_deg": round(math.degrees(self._last_error_rad), 3),
             "duration_s": round(now_s - self.begun_s, 3),
         }
@@ -123,9 +118,7 @@ class CarStream(CarMotion):
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """Follow the newest value, or come to rest where it is too old."""
-        self.target = self.stream.at(measurement.time_s)
-        if not self.stop_reason and self.stream.over:
-            self.stop("no new value came")
+        self.target = self.newest(self.stream, measurement.time_s)
         return super().step(measurement, dt_s)
 
     def _may_end(self) -> bool:

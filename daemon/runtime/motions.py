@@ -3,14 +3,28 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Awaitable, Callable
-from typing import Any
+from typing import Any, TypeVar
 
 from canhelm.errors import CanhelmError, Refused
 from daemon.loops.measurement import Command, Measurement
+from daemon.loops.odometry import Pose
+from daemon.loops.path import wrap
 from daemon.runtime.streams import Streamed
 from drivers.contract import Drive, DriveState
+
+T = TypeVar("T")
+
+
+def pose_result(pose: Pose) -> dict[str, float]:
+    """A pose for the result of a motion."""
+    return {
+        "x_m": round(pose.x_m, 4) + 0.0,
+        "y_m": round(pose.y_m, 4) + 0.0,
+        "heading_deg": round(math.degrees(wrap(pose.yaw_rad)), 3) + 0.0,
+    }
 
 
 class Motion(ABC):
@@ -64,6 +78,13 @@ class Motion(ABC):
     def stop(self, reason: str) -> None:
         """Bring the motion to rest by its ramp and end it."""
         self.stop_reason = self.stop_reason or reason
+
+    def newest(self, stream: Streamed[T], now_s: float) -> T | None:
+        """The value of a stream, None where it is too old; a stream that is over stops the motion."""
+        value = stream.at(now_s)
+        if not self.stop_reason and stream.over:
+            self.stop("no new value came")
+        return value
 
     def progress(self) -> dict[str, Any]:
         """How far it is, for ``status``."""
@@ -127,16 +148,15 @@ class WheelVelocity(Motion):
         self._wheel = wheel
         self._count = wheel_count
         self._speed_m_s = speed_m_s
-        self._remaining_s = duration_s
+        self._remaining_s = math.inf if duration_s is None else duration_s
         self._travel_m: float | None = None
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """The target until the time is over, then zero until the wheel is at rest."""
         travel = measurement.wheel_travel_m[self._wheel]
         self._travel_m = travel if self._travel_m is None else self._travel_m
-        if self._remaining_s is not None:
-            self._remaining_s -= dt_s
-        over = bool(self.stop_reason) or (self._remaining_s is not None and self._remaining_s <= 0.0)
+        self._remaining_s -= dt_s
+        over = bool(self.stop_reason) or self._remaining_s <= 0.0
         speed = measurement.wheel_speed_m_s[self._wheel]
         if over and abs(speed) < self.AT_REST_M_S:
             self.finish({"wheel_travel_m": round(travel - self._travel_m, 6)})
@@ -146,7 +166,7 @@ class WheelVelocity(Motion):
 
     def progress(self) -> dict[str, Any]:
         """Target and measured speed, and the time left."""
-        left = None if self._remaining_s is None else max(0.0, round(self._remaining_s, 3))
+        left = max(0.0, round(self._remaining_s, 3)) if math.isfinite(self._remaining_s) else None
         return {
             "target_velocity_rpm": round(self._drive.rpm_from_speed(self._speed_m_s), 1),
             "velocity_rpm": round(self._drive.rpm_from_speed(self._drive.speed_m_s), 1),
@@ -171,14 +191,13 @@ class AsideVelocity(Motion):
         self._drive = drive
         self._zero = Command((0.0,) * wheel_count)
         self._speed_m_s = speed_m_s
-        self._remaining_s = duration_s
+        self._remaining_s = math.inf if duration_s is None else duration_s
         self._from_m = drive.position_m
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """The target until the time is over, then zero until the drive is at rest."""
-        if self._remaining_s is not None:
-            self._remaining_s -= dt_s
-        over = bool(self.stop_reason) or (self._remaining_s is not None and self._remaining_s <= 0.0)
+        self._remaining_s -= dt_s
+        over = bool(self.stop_reason) or self._remaining_s <= 0.0
         self._drive.command_speed(0.0 if over else self._speed_m_s)
         if over and abs(self._drive.speed_m_s) < WheelVelocity.AT_REST_M_S:
             self.finish({"wheel_travel_m": round(self._drive.position_m - self._from_m, 6)})

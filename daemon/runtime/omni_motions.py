@@ -10,9 +10,8 @@ from daemon.loops.measurement import Command, Measurement
 from daemon.loops.omni_drive import OmniLaw, OmniRecord
 from daemon.loops.omni_guide import Twist, TwistGuide
 from daemon.loops.omni_senses import OmniSenses
-from daemon.loops.path import wrap
 from daemon.loops.planner import PlanarState, Result
-from daemon.runtime.motions import Motion
+from daemon.runtime.motions import Motion, pose_result
 from daemon.runtime.streams import Streamed
 
 FAILED = (Result.INVALID, Result.GOAL_TOO_FAST)
@@ -62,11 +61,8 @@ class OmniMotion(Motion):
 
     def numbers(self, measurement: Measurement) -> dict[str, Any]:
         """Where the robot is, and how it went."""
-        pose = self._senses.pose
         return {
-            "x_m": round(pose.x_m, 4),
-            "y_m": round(pose.y_m, 4),
-            "heading_deg": round(math.degrees(wrap(pose.yaw_rad)), 3),
+            **pose_result(self._senses.pose),
             "duration_s": round(measurement.time_s - self.begun_s, 3),
             "least_safety_factor": round(self.least_factor, 3),
             "slip_steps": self.slip_steps,
@@ -149,19 +145,18 @@ class TwistMotion(OmniMotion):
     ) -> None:
         super().__init__(kind, drives, lease, senses, law)
         self._guide = guide
-        self._remaining_s = duration_s
+        self._remaining_s = math.inf if duration_s is None else duration_s
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """The twist until the time is over, then rest."""
-        if self._remaining_s is not None:
-            self._remaining_s -= dt_s
-            if self._remaining_s <= 0.0:
-                self._guide.twist = STANDING
+        self._remaining_s -= dt_s
+        if self._remaining_s <= 0.0:
+            self._guide.twist = STANDING
         return super().step(measurement, dt_s)
 
     def on_done(self, measurement: Measurement, record: OmniRecord) -> None:
         """At rest: over, unless it stands because that was asked for."""
-        if record.stopping or (self._remaining_s is not None and self._remaining_s <= 0.0):
+        if record.stopping or self._remaining_s <= 0.0:
             super().on_done(measurement, record)
 
 
@@ -189,9 +184,7 @@ class TwistStream(OmniMotion):
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """Follow the newest value, or come to rest where it is too old."""
-        self._guide.twist = self.stream.at(measurement.time_s) or STANDING
-        if not self.stop_reason and self.stream.over:
-            self.stop("no new value came")
+        self._guide.twist = self.newest(self.stream, measurement.time_s) or STANDING
         return super().step(measurement, dt_s)
 
     def on_done(self, measurement: Measurement, record: OmniRecord) -> None:

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 from daemon.loops.measurement import Command, Measurement
 from daemon.loops.odometry import Pose
 from daemon.loops.own_vehicle import OwnVehicle, Twist
-from daemon.runtime.motions import Motion
+from daemon.runtime.motions import Motion, pose_result
 from daemon.runtime.rest import AT_REST_M_S
 from daemon.runtime.streams import Streamed
 
@@ -44,14 +44,13 @@ class OwnMotion(Motion):
         self.target: Twist | None = twist
         self._law = law
         self._senses = senses
-        self._remaining_s = duration_s
+        self._remaining_s = math.inf if duration_s is None else duration_s
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """One step of the law; without a target it brings the robot to rest."""
-        if self.stop_reason or (self._remaining_s is not None and self._remaining_s < dt_s / 2):
+        if self.stop_reason or self._remaining_s < dt_s / 2:
             self.target = None
-        elif self._remaining_s is not None:
-            self._remaining_s -= dt_s
+        self._remaining_s -= dt_s
         if self._senses.failure:
             raise RuntimeError(self._senses.failure)
         command = self._law.step(measurement, self.target, dt_s)
@@ -65,15 +64,8 @@ class OwnMotion(Motion):
 
     def on_rest(self, measurement: Measurement) -> None:
         """At rest without a target."""
-        pose = self._senses.pose
-        self.finish(
-            {
-                "x_m": round(pose.x_m, 4),
-                "y_m": round(pose.y_m, 4),
-                "heading_deg": round(math.degrees(pose.yaw_rad), 3),
-                "duration_s": round(measurement.time_s - self.begun_s, 3),
-            }
-        )
+        duration_s = round(measurement.time_s - self.begun_s, 3)
+        self.finish({**pose_result(self._senses.pose), "duration_s": duration_s})
 
     def progress(self) -> dict[str, Any]:
         """The target, and the time left."""
@@ -83,7 +75,7 @@ class OwnMotion(Motion):
             "forward_m_s": round(forward, 4),
             "left_m_s": round(left, 4),
             "yaw_rate_deg_s": round(math.degrees(rate), 3),
-            "remaining_s": None if self._remaining_s is None else max(0.0, round(self._remaining_s, 3)),
+            "remaining_s": max(0.0, round(self._remaining_s, 3)) if math.isfinite(self._remaining_s) else None,
         }
 
 
@@ -109,9 +101,7 @@ class OwnStream(OwnMotion):
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """Follow the newest value, or come to rest where it is too old."""
-        self.target = self.stream.at(measurement.time_s)
-        if not self.stop_reason and self.stream.over:
-            self.stop("no new value came")
+        self.target = self.newest(self.stream, measurement.time_s)
         return super().step(measurement, dt_s)
 
     def on_rest(self, measurement: Measurement) -> None:

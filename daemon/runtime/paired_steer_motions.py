@@ -99,9 +99,7 @@ class StreamMotion(PairedSteerMotion):
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """Follow the newest value, or come to rest where it is too old."""
-        self._target = self.stream.at(measurement.time_s)
-        if not self.stop_reason and self.stream.over:
-            self.stop("no new value came")
+        self._target = self.newest(self.stream, measurement.time_s)
         if self.stop_reason or self._target is not None:
             return super().step(measurement, dt_s)
         command, self.record = self._law.step(measurement, None, dt_s)

@@ -43,9 +43,7 @@ class TruckStream(Motion):
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """Follow the newest value, or come to rest where it is too old or the motion was stopped."""
-        vehicle, target = self._vehicle, self.stream.at(measurement.time_s)
-        if not self.stop_reason and self.stream.over:
-            self.stop("no new value came")
+        vehicle, target = self._vehicle, self.newest(self.stream, measurement.time_s)
         record = self.record = self._law.step(vehicle.reading, None if self.stop_reason else target, dt_s)
         rests = record.speed_m_s == 0.0 and abs(vehicle.reading.speed_m_s) < AT_REST_M_S
         if record.failure and rests:
