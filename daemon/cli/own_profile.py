@@ -5,11 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import profiles
 from canhelm.errors import ConfigError, NotReady
 
 if TYPE_CHECKING:
     from profiles.loader import LoadedProfile
     from profiles.schema import Profile
+
+
+SHIPPED = Path(next(iter(profiles.__path__)))
+
+
+def is_own(file: str | None) -> bool:
+    """Whether a profile's file is somebody's own, not a shipped one."""
+    return file is not None and not Path(file).is_relative_to(SHIPPED)
 
 
 def own_profile(status: dict[str, Any]) -> LoadedProfile:
@@ -22,10 +31,10 @@ def own_profile(status: dict[str, Any]) -> LoadedProfile:
         ConfigError: it has none of its own, or the file says something else by now.
         NotReady: a node is not ready.
     """
-    from profiles.loader import SHIPPED, load
+    from profiles.loader import load
 
     file = status["profile_file"]
-    if file is None or Path(file).is_relative_to(SHIPPED):
+    if not is_own(file):
         remedy = "begin one: `canhelm profile new NAME --extends max2d --out NAME.yaml`, and run the daemon with it"
         raise ConfigError("this robot has no profile of its own that could be changed", value=file, remedy=remedy)
     loaded = load(file)

@@ -10,6 +10,7 @@ from cyclopts import Parameter
 
 from daemon.cli.options import DEFAULT, Options
 from daemon.cli.output import show, words
+from daemon.cli.own_profile import is_own
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
@@ -78,6 +79,8 @@ def table(data: Mapping[str, Any]) -> RenderableType:
     parts: list[RenderableType] = [_headline(data), _NodeTable(nodes), *_troubles(nodes)]
     if data.get("setup") == "needed":
         parts.append("the robot was not set up: `canhelm setup`")
+    elif data.get("setup") == "waived" and is_own(data.get("profile_file")):
+        parts.append("its setup is waived: nobody has looked at wheels, encoders and brakes (`canhelm setup`)")
     parts += [_found(row) for row in data.get("found") or ()]
     parts.append(_brakes(data.get("brakes") or ()))
     parts += [_section(f"brick {brick['name']}", brick) for brick in data.get("bricks") or ()]

@@ -8,9 +8,18 @@ from typing import Any
 
 import pytest
 
-from daemon.cli.doctor import Finding, bit_rate_findings, interface_finding, interface_findings, status_findings
+from daemon.cli.doctor_machine import (
+    adapter_findings,
+    bit_rate_findings,
+    interface_finding,
+    interface_findings,
+    name_findings,
+)
+from daemon.cli.doctor_status import status_findings
+from daemon.cli.finding import Finding
 from daemon.cli.main import main
 from drivers.bus.can_link import CanLink
+from profiles.loader import SHIPPED
 from vcan_tests.daemon.fake_backend import FakeBackend, served
 
 READY = {"node": 1, "name": "rear_right", "node_state": "ready", "state": "disabled"}
@@ -66,6 +75,68 @@ def test_another_bit_rate_than_the_profiles_is_a_problem() -> None:
     assert found.mend == (
         "sudo ip link set can0 down; sudo ip link set can0 up type can bitrate 1000000 restart-ms 100"
     )
+
+
+def test_a_kernel_without_can_is_told_with_the_module_that_it_lacks(tmp_path: Path) -> None:
+    (found,) = interface_findings(tmp_path, has_can=False)
+    assert (found.verdict, found.mend.startswith("sudo modprobe can_raw")) == ("note", True)
+
+
+@pytest.mark.parametrize(
+    ("vendor", "product", "module"),
+    [("1d50", "606f", "gs_usb"), ("0c72", "000c", "peak_usb"), ("0bfd", "0120", "kvaser_usb")],
+)
+def test_an_adapter_without_its_driver_is_told_with_the_module(
+    tmp_path: Path, vendor: str, product: str, module: str
+) -> None:
+    adapter = tmp_path / "1-1"
+    adapter.mkdir()
+    (adapter / "idVendor").write_text(f"{vendor}\n")
+    (adapter / "idProduct").write_text(f"{product}\n")
+    (found,) = adapter_findings(tmp_path)
+    assert (found.verdict, found.mend) == ("problem", f"sudo modprobe {module}")
+    (adapter / "1-1:1.0" / "net" / "can0").mkdir(parents=True)
+    assert not list(adapter_findings(tmp_path))
+
+
+def test_a_daemon_on_an_interface_that_is_not_there_is_told_which_one_is(tmp_path: Path) -> None:
+    interface(tmp_path)
+    (found,) = name_findings({"name": "can7", "down": "No such device"}, tmp_path)
+    assert found.finding == "there is no interface can7, but can0"
+    assert "--bus socketcan:can0" in found.mend
+    assert not list(name_findings({"name": "can0", "down": "Network is down"}, tmp_path))
+
+
+def test_error_frames_and_nobody_who_answers_are_another_bit_rate() -> None:
+    bus = {"name": "can0", "bit_rate": 1_000_000, "error_frames": 40}
+    told = findings({"bus": {"error_frames": 12}}, bus=bus)["wire"]
+    assert (told.verdict, "down; sudo ip link set can0 up type can bitrate 500000" in told.mend) == ("problem", True)
+    assert "wire" not in findings({"bus": {"error_frames": 12}}, bus=bus, nodes=[READY])
+
+
+def test_guarding_answers_out_of_turn_are_two_nodes_with_one_id() -> None:
+    told = findings({"bus": {"toggle_errors": 2}}, bus={"toggle_errors": 21})["node ids"]
+    assert (told.verdict, told.mend) == ("problem", "canhelm nodes scan")
+    assert findings({"bus": {"toggle_errors": 21}}, bus={"toggle_errors": 21})["node ids"].verdict == "note"
+
+
+@pytest.mark.parametrize(
+    ("status", "words"),
+    [
+        ({"setup": "needed"}, "does not drive before"),
+        ({"setup": "waived", "profile_file": "/etc/canhelm/robots/lab1.yaml"}, "its setup is waived"),
+    ],
+)
+def test_a_robot_that_was_not_set_up_is_noted(status: dict[str, Any], words: str) -> None:
+    told = findings(**status)["setup"]
+    assert (told.verdict, words in told.finding) == ("note", True)
+
+
+@pytest.mark.parametrize(
+    "status", [{"setup": "done"}, {"setup": "waived", "profile_file": str(SHIPPED / "robots" / "max2d.yaml")}]
+)
+def test_a_robot_that_was_set_up_and_a_shipped_one_are_not(status: dict[str, Any]) -> None:
+    assert "setup" not in findings(**status)
 
 
 @pytest.mark.parametrize("link", [CanLink(), CanLink(1_000_000)])
