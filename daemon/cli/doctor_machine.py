@@ -24,7 +24,7 @@ DRIVERS = {
     ("0c72", ""): "peak_usb",
     ("0bfd", ""): "kvaser_usb",
 }
-"""Kernel modules of USB adapters by vendor and product: candleLight and the like, PEAK, Kvaser (drivers/net/can/usb)."""
+"""Modules of USB adapters by vendor and product: candleLight, PEAK, Kvaser (Linux, drivers/net/can/usb)."""
 ARPHRD_CAN = "280"
 IFF_UP = 1
 WANTED_QUEUE = 100
@@ -134,10 +134,9 @@ def name_findings(bus: Mapping[str, Any], devices: Path) -> Iterator[Finding]:
         devices: ``/sys/class/net``.
     """
     name, others = str(bus.get("name")), _names(devices)
-    if bus.get("down") and others and not (devices / name).exists():
-        mend = (
-            f"canhelm run --bus socketcan:{others[0]} ..., for a service CANHELM_BUS=socketcan:{others[0]} in its .env"
-        )
+    if bus.get("down") and others and not name.startswith("tty") and not (devices / name).exists():
+        spec = f"socketcan:{others[0]}"
+        mend = f"canhelm run --bus {spec} ...; for a service CANHELM_BUS={spec} in its .env"
         yield Finding("name", "problem", f"there is no interface {name}, but {', '.join(others)}", mend)
 
 
