@@ -21,10 +21,8 @@ COUNTED = ("wheels", "encoders", "brakes")
 """How many of each a law has."""
 LAW = (*COUNTED, "parameters", "step", "body_motion", "objection")
 """What a law has to have: daemon.loops.own_vehicle."""
-TWIN = ("axes", "advance", "moving", "pose", "velocity", "heading_rad", "set_brake")
+TWIN = ("advance", "moving", "pose", "velocity", "heading_rad", "set_brake")
 """What a twin has to have: drivers.simulated.body."""
-MADE = ("axes",)
-"""What an object has that its class does not show."""
 
 
 def load_class(name: str) -> type[Any]:
@@ -68,7 +66,7 @@ def _checked(name: str, key: str, needed: tuple[str, ...]) -> tuple[type[Any] | 
         what = f"{name} failed while it was imported: {type(error).__name__}: {error}"
         return None, [Finding(path, what, "mend it; the traceback is in the log")]
     abstract: frozenset[str] = getattr(found, "__abstractmethods__", frozenset())
-    lacking = [part for part in needed if part not in MADE and not hasattr(found, part)]
+    lacking = [part for part in needed if not hasattr(found, part)]
     lacking += [part for part in sorted(abstract) if part not in lacking]
     if lacking:
         return None, [Finding(path, f"{name} lacks {', '.join(lacking)}", "write them as docs/own-vehicle.md says")]
@@ -84,17 +82,14 @@ def _counts(law: type[Any], vehicle: OwnGeometry) -> Iterator[Finding]:
 
 
 def _parameters(law: type[Any], vehicle: OwnGeometry) -> Iterator[Finding]:
-    known = list(law.parameters)
-    for name in known:
-        if name not in vehicle.parameters:
-            yield Finding(
-                ("vehicle", "parameters", name), f"is missing, {vehicle.kind} needs it", f"write {name}: with a number"
-            )
-    for name in vehicle.parameters:
-        if name not in known:
-            close = difflib.get_close_matches(name, known, n=1)
-            remedy = f"did you mean {close[0]}?" if close else f"it knows: {', '.join(known) or 'none'}"
-            yield Finding(("vehicle", "parameters", name), f"is a number that {vehicle.kind} does not know", remedy)
+    known, given = list(law.parameters), list(vehicle.parameters)
+    for name in (name for name in known if name not in given):
+        what = f"is missing, {vehicle.kind} needs it"
+        yield Finding(("vehicle", "parameters", name), what, f"write {name}: with a number")
+    for name in (name for name in given if name not in known):
+        close = difflib.get_close_matches(name, known, n=1)
+        remedy = f"did you mean {close[0]}?" if close else f"it knows: {', '.join(known) or 'none'}"
+        yield Finding(("vehicle", "parameters", name), f"is a number that {vehicle.kind} does not know", remedy)
 
 
 def _made(law: type[Any], vehicle: OwnGeometry, limits: Limits) -> Iterator[Finding]:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from functools import partial
 from math import cos, radians, sin
 from random import Random
 
 import msgspec
 
+from canhelm.errors import ConfigError
 from drivers.simulated.ackermann import AckermannWorld
 from drivers.simulated.angle_sensor import SimulatedAngleSensor
 from drivers.simulated.body import BodyWorld
@@ -30,6 +32,7 @@ from profiles.schema import BrakeConfig, OmniGeometry, Profile
 from profiles.sensors import SensorDefects
 from profiles.steered import CarGeometry, SemitrailerGeometry
 
+LOGGER = logging.getLogger("canhelm")
 FACTORY_NODE = 1
 """Node id of a drive that nobody has set up."""
 ALL_OFF = 0
@@ -49,11 +52,21 @@ def make_world(profile: Profile, seed: int) -> BodyWorld:
     if isinstance(profile.vehicle, SemitrailerGeometry):
         return SemitrailerWorld(profile, seed)
     if isinstance(profile.vehicle, OwnGeometry) and profile.vehicle.twin is not None:
-        world: BodyWorld = load_class(profile.vehicle.twin)(profile, seed)
-        return world
+        return _own_world(profile.vehicle.twin, profile, seed)
     if profile.vehicle is None or isinstance(profile.vehicle, DifferentialGeometry | OwnGeometry):
         return StandWorld(profile, profile.drives, seed)
     return Max2dWorld(profile, seed)
+
+
+def _own_world(name: str, profile: Profile, seed: int) -> BodyWorld:
+    """The twin that a profile names. Raises ConfigError where none can be made of its numbers."""
+    try:
+        world: BodyWorld = load_class(name)(profile, seed)
+    except Exception as error:
+        LOGGER.exception("%s cannot be made", name)
+        what = f"the twin {name} cannot be made: {type(error).__name__}: {error}"
+        raise ConfigError(what, object="vehicle.twin", remedy="mend it; the traceback is in the log") from error
+    return world
 
 
 class SimulatedNetwork:

@@ -10,7 +10,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from canhelm.errors import DeviceFault, LimitExceeded, Refused
+from canhelm.errors import ConfigError, DeviceFault, LimitExceeded, Refused
+from daemon.app import App
 from profiles.loader import load
 from profiles.own_vehicle import OwnGeometry
 from profiles.schema import Profile
@@ -19,11 +20,17 @@ from vcan_tests.robot import Robot, running_robot
 EXAMPLE = Path(__file__).parents[2] / "examples" / "own_vehicle"
 FAULTY = """
 from mecanum import Mecanum
+from mecanum_twin import MecanumWorld
 
 class Short(Mecanum):
     def step(self, measurement, target, dt_s):
         command = super().step(measurement, target, dt_s)
         return type(command)(command.wheel_speed_m_s[:3])
+
+class Weightless(MecanumWorld):
+    def __init__(self, profile, seed):
+        super().__init__(profile, seed)
+        self.weight_n = profile.vehicle.parameters["mass"] * 9.81
 
 class Lost(Mecanum):
     def body_motion(self, rolled, heading_rad):
@@ -109,6 +116,11 @@ async def test_without_a_twin_its_wheels_turn_in_the_air(mecanum: Profile) -> No
         result = await robot.call("drive.parallel", angle_deg=0, speed_m_s=0.5, duration_s=1)
         assert result["x_m"] == pytest.approx(0.5, abs=0.01)
         assert robot.network.world.pose == (0, 0, 0)
+
+
+def test_a_twin_that_cannot_be_made_is_named(faulty: Profile) -> None:
+    with pytest.raises(ConfigError, match="twin faulty:Weightless cannot be made: KeyError: 'mass'"):
+        App(changed(faulty, twin="faulty:Weightless"))
 
 
 async def test_the_log_says_whose_code_runs_inside_the_daemon(
