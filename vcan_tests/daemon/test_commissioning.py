@@ -145,8 +145,8 @@ STEERED = {
 """How a steered axle may be built otherwise than its profile says, and by which name it is found."""
 
 
-def steered_robot(folder: Path, robot: str, text: str) -> Path:
-    """A profile that extends one with a steered axle."""
+def robot_of(folder: Path, robot: str, text: str) -> Path:
+    """A profile that extends a shipped one."""
     folder.mkdir()
     file = folder / "lab1.yaml"
     file.write_text(f"schema_version: 1\nname: lab1\nextends: robots/{robot}\nsetup: needed\n{text}\n")
@@ -157,7 +157,7 @@ def steered_robot(folder: Path, robot: str, text: str) -> Path:
 @pytest.mark.parametrize("fault", STEERED)
 async def test_an_axle_that_a_motor_steers_is_found_and_put_right(fault: str, robot: str, tmp_path: Path) -> None:
     text, words = STEERED[fault]
-    mine, built = steered_robot(tmp_path / "mine", robot, ""), steered_robot(tmp_path / "built", robot, text)
+    mine, built = robot_of(tmp_path / "mine", robot, ""), robot_of(tmp_path / "built", robot, text)
     async with workshop(mine, built) as shop:
         findings = await shop.commission()
     assert findings.unsolved == []
@@ -172,7 +172,7 @@ async def test_an_axle_that_a_motor_steers_is_found_and_put_right(fault: str, ro
 
 
 async def test_the_steered_axle_can_be_looked_at_alone(tmp_path: Path) -> None:
-    async with workshop(steered_robot(tmp_path / "mine", "ackermann", "")) as shop:
+    async with workshop(robot_of(tmp_path / "mine", "ackermann", "")) as shop:
         findings = await shop.commission("steering")
         assert (findings.wrong, findings.unsolved, findings.values) == ([], [], {})
         assert not any(heard.startswith("turn wheel") for heard in shop.person.heard)
@@ -211,10 +211,14 @@ async def test_motors_at_a_brick_are_not_looked_at_and_that_is_told(tmp_path: Pa
         assert "write setup: done" in str(refusal.value.remedy)
 
 
-async def test_a_robot_is_not_driven_before_its_setup(tmp_path: Path) -> None:
-    async with workshop(robot_file(tmp_path)) as shop:
-        with pytest.raises(Interlock, match="was not set up"):
-            await shop.call("drive.parallel", angle_deg=0.0, speed_m_s=0.1, duration_s=1.0)
+@pytest.mark.parametrize("robot", ["max2d", "turtle", "semitrailer", "ackermann", "nxt"])
+async def test_no_robot_is_driven_before_its_setup(robot: str, tmp_path: Path) -> None:
+    async with workshop(robot_of(tmp_path / "mine", robot, "")) as shop:
+        methods = shop.robot.app.service.status()["vehicle"]["methods"]
+        assert any(method.startswith("drive.") for method in methods)
+        for method in methods:
+            with pytest.raises(Interlock, match="was not set up"):
+                await shop.call(method)
 
 
 @pytest.mark.parametrize("what", ["done", "waived"])
