@@ -28,6 +28,8 @@ CYCLE_S = 0.01
 ALLOWED = 1e-9
 ARRIVED_M = 1e-3
 ARRIVED_M_S = 1e-3
+ALLOWED_US = 60.0
+TRIALS = 5
 
 
 def main(argv: Sequence[str]) -> int:
@@ -124,13 +126,17 @@ def against_the_optimum(problems: list[Problem]) -> bool:
 
 
 def cost(problems: list[Problem]) -> bool:
-    """Microseconds of a step of each kind, the machine as it is."""
+    """Microseconds of a planning step of each kind, the machine as it is.
+
+    A step along the plan is what a robot pays in each cycle, a plan made anew what it pays for a new goal or a push. A
+    plan has to be within the limit at the best of a few trials, which is what it costs without its neighbours.
+    """
     plans = [plan_motion(problem.start, problem.goal, problem.limits) for problem in problems]
     step = _microseconds("a step along the plan", [_step(plan) for plan in plans])
-    _microseconds("a plan made anew", [_plan(problem) for problem in problems])
+    anew = _microseconds("a plan made anew", [_plan(problem) for problem in problems])
     _microseconds("a call of the published planner", [_published(problem) for problem in problems])
     _microseconds("Ruckig, two synchronised axes, no jerk limit", [_by_ruckig(problem) for problem in problems])
-    return step <= 60
+    return max(step, anew) <= ALLOWED_US
 
 
 def _step(plan: Plan) -> Callable[[], object]:
@@ -145,11 +151,10 @@ def _plan(problem: Problem) -> Callable[[], object]:
 
 def _published(problem: Problem) -> Callable[[], object]:
     start, goal, limits = problem.start, problem.goal, problem.limits
-    planner = PublishedPlanner()
     given = PlanningProblem(
         (goal.x, goal.y), (start.vx, start.vy), (goal.vx, goal.vy), limits.speed, limits.acceleration
     )
-    return lambda: planner.step(given)
+    return lambda: PublishedPlanner().step(given)
 
 
 def _by_ruckig(problem: Problem) -> Callable[[], object]:
@@ -160,15 +165,21 @@ def _by_ruckig(problem: Problem) -> Callable[[], object]:
 
 
 def _microseconds(name: str, calls: list[Callable[[], object]]) -> float:
-    times = []
-    for call in calls:
-        began = perf_counter()
-        call()
-        times.append((perf_counter() - began) * 1e6)
-    times.sort()
-    median, late = statistics.median(times), times[int(0.99 * (len(times) - 1))]
-    print(f"{name}: {median:.1f} us median, {late:.0f} us p99")
-    return median
+    """Prints what a call takes, once and at best; returns the median of the best."""
+    once = sorted(map(_timed, calls))
+    best = sorted(min(_timed(call) for _ in range(TRIALS)) for call in calls)
+    late = int(0.99 * (len(calls) - 1))
+    print(
+        f"{name}: {statistics.median(once):.1f} us median, {once[late]:.0f} us p99;"
+        f" best of {TRIALS} {statistics.median(best):.1f} us median, {best[late]:.0f} us p99"
+    )
+    return statistics.median(best)
+
+
+def _timed(call: Callable[[], object]) -> float:
+    began = perf_counter()
+    call()
+    return (perf_counter() - began) * 1e6
 
 
 if __name__ == "__main__":

@@ -260,7 +260,8 @@ def _together(start: PlanarState, goal: PlanarState, limits: PlanarLimits) -> tu
 
 
 def _vector(x: float, y: float) -> complex:
-    return complex(0.0 if abs(x) < NOTHING else x, 0.0 if abs(y) < NOTHING else y)
+    vector = complex(x, y)
+    return vector if abs(vector) >= NOTHING else 0j
 
 
 def _plain(number: float) -> float:

@@ -116,16 +116,19 @@ class Chain(NamedTuple):
 
 def chain(start: complex, arcs: Iterable[Arc]) -> Chain:
     """The arcs with their places, from a velocity on."""
-    lasting = tuple([arc for arc in arcs if arc.duration > 0])
     way, velocity, time = 0j, start, 0.0
+    lasting: list[Arc] = []
     places, times = [(way, velocity)], [time]
-    for arc in lasting:
-        displacement, velocity = arc.at(arc.duration)
-        way += displacement
-        time += arc.duration
-        places.append((way, velocity))
-        times.append(time)
-    return Chain(lasting, tuple(places), tuple(times))
+    for arc in arcs:
+        duration = arc.duration
+        if duration > 0.0:
+            displacement, velocity = arc.at(duration)
+            way += displacement
+            time += duration
+            lasting.append(arc)
+            places.append((way, velocity))
+            times.append(time)
+    return Chain(tuple(lasting), tuple(places), tuple(times))
 
 
 def ramp_between(start: complex, end: complex) -> Ramp:

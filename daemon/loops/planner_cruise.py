@@ -121,12 +121,14 @@ def half_turn(velocity: complex, contact: float) -> Change:
     c = math.cos(p)
     b = s * s / (1 + c)
     q, root, h = _bend_to(along, c, s, b)
-    tilt = along - across * c / root
-    bent = max(1 + s * (h - q / root), LEAST_BENT)
+    steepness, tilt = q / root, along - across * c / root
+    bent = 1 + s * (h - steepness)
+    if bent < LEAST_BENT:
+        bent = LEAST_BENT
     narrow = 2 * c - 1
     miss = (across - s - b * c * h) / (narrow * bent)
     displaced = b * (along * c + across * root) + s * narrow * tilt * miss
-    slope = b * (across * c - along * root) - across * across * q / root - s * tilt * tilt / bent
+    slope = b * (across * c - along * root) - across * across * steepness - s * tilt * tilt / bent
     contact_slope = tilt / (narrow * bent)
     if signed < 0.0:
         displaced, contact_slope = -displaced, -contact_slope
@@ -135,7 +137,9 @@ def half_turn(velocity: complex, contact: float) -> Change:
 
 def _bend_to(along: float, c: float, s: float, b: float) -> tuple[float, float, float]:
     """q = (1 - along) / b, root = sqrt(q^2 - c^2), h = log((q + root) / (1 + s)); q / c is cosh u at the start."""
-    q = max((1 - along) / b, 1.0)
+    q = (1 - along) / b
+    if q < 1.0:
+        q = 1.0
     root = math.sqrt((q - 1) * (q + 1) + s * s)
     return q, root, math.log((q + root) / (1 + s))
 

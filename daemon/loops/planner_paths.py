@@ -27,8 +27,8 @@ MAY_CRUISE: Final = 0.7
 """Speed of the corner above which a cruise at the speed limit is sought."""
 LIKELY_CRUISE: Final = 1.05
 """Speed of the corner above which a cruise is more likely than a bend within the speed limit."""
-FAR: Final = 2.75
-"""Travel from which on there is room for a cruise."""
+FAR: Final = 1.8
+"""Travel from which on there is nearly always room for a cruise."""
 CRUISES: Final = 0.999
 """Speed at the start above which its heading may be that of the cruise."""
 ROUGH: Final = 3e-2
