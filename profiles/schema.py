@@ -375,10 +375,6 @@ class Profile(Part, frozen=True, kw_only=True):
     """None: slip of the wheels is not answered."""
     simulation: SimulationConfig | None = None
 
-    def drive_of_node(self, node: int) -> str | None:
-        """Name of the drive with this node id."""
-        return next((name for name, drive in self.drives.items() if drive.node == node), None)
-
     @property
     def motors(self) -> dict[str, NxtMotorConfig]:
         """Motors of all bricks by their names."""

@@ -29,7 +29,6 @@ class DemoView:
 
         self._every = every
         self._cycles = 0
-        self._sentence = ""
         self._live = Live(console=console(stderr=True), auto_refresh=False, transient=True)
         self._shown = sys.stderr.isatty()
 
@@ -44,7 +43,6 @@ class DemoView:
 
     def tell(self, sentence: str) -> None:
         """A step of the demo."""
-        self._sentence = sentence
         if self._shown:
             self._live.console.print(f"· {sentence}")
         else:

@@ -20,7 +20,6 @@ PerPair = tuple[float, float]
 REAR: Final = 0
 FRONT: Final = 1
 PAIR_NAMES: Final = ("rear", "front")
-PAIR_OF_WHEEL: Final = (REAR, REAR, FRONT, FRONT)
 WHEELS_OF_PAIR: Final = ((0, 1), (2, 3))
 TURN_SIGN: Final[PerWheel] = (1.0, -1.0, -1.0, 1.0)
 """+1: the wheel rolls forward when its pair turns counter-clockwise (right wheels), -1: backward (left wheels)."""

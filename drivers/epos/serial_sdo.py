@@ -60,7 +60,6 @@ class SdoBridge:
         self._on_failure = on_failure
         self._address = (0, 0)
         self._value = b""
-        self._left = 0
         self._task: asyncio.Task[None] | None = None
 
     @property
@@ -133,7 +132,7 @@ class SdoBridge:
         command, index, sub, value = _HEAD.unpack(data)
         self._address = (index, sub)
         if not command & 2:
-            self._value, self._left = b"", int.from_bytes(value, "little")
+            self._value = b""
             self._answer(_HEAD.pack(0x60, index, sub, b""))
             return
         size = 4 - (command >> 2 & 3) if command & 1 else 4
