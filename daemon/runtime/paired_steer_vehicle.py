@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from canhelm.errors import Interlock, Refused, UsageError
 from daemon.loops.geometry import PAIR_NAMES
+from daemon.loops.locked_drive import LockedDrive
 from daemon.loops.measurement import Measurement
 from daemon.loops.odometry import Odometry
 from daemon.loops.paired_steer import PairedSteerLaw
@@ -88,6 +89,12 @@ class PairedSteerVehicle(Vehicle):
             "steering": both_ways(steering_deg),
             "direction": both_ways(heading_deg),
         }
+
+    def ramp_s(self) -> float:
+        """On the narrowest curve, where the fastest wheel's ramp counts."""
+        steering_rad = math.radians(self.sticks()["steering"][1])
+        curve = LockedDrive(self.geometry, self.limits, (-steering_rad, steering_rad))
+        return self.limits.speed_m_s / curve.acceleration_m_s2
 
     def new_law(self) -> PairedSteerLaw:
         """A law of its own for one motion."""
