@@ -34,9 +34,9 @@ from daemon.runs.store import RunStore
 from daemon.runtime.clock import run_virtual
 from profiles.loader import load
 
-MOMENT_S = 2.0
+MOMENT_S = 0.5
 """What a person takes between two commands."""
-BOOT_S, HOUR_S = 5.0, 3600.0
+BOOT_S, HOUR_S = 3.0, 3600.0
 LOOK_S = 0.01
 RENEW_S = 0.5
 RENEWAL = protocol.make_request(0, "lease.renew", {}).replace(b'"id":0,', b"")
