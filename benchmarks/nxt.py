@@ -16,11 +16,10 @@ from statistics import median
 from typing import Any
 
 from daemon.demo_nxt import FIGURES, NxtResult, drive
-from daemon.loops.differential import TachoCompensation, line
 from daemon.runtime.clock import run_virtual
 from drivers.nxt.telegrams import Unframer, parse_reply, parse_request
 from profiles.loader import load
-from vcan_tests.daemon.nxt_bench import DRIVE, NxtBench, legs
+from vcan_tests.daemon.nxt_bench import errors_of_lines
 
 ROBOTS, STRINGS = 100, 1_000_000
 WITHIN_CM, WITHIN_DEG = 0.5, 3.0
@@ -60,18 +59,7 @@ def _middle(misses: Iterable[dict[str, Any]], key: str) -> float:
 
 async def worst_of_a_row(seed: int, compensated: bool) -> float:
     """By how much [deg] a wheel misses its angle at worst, from the second of six lines of 20 cm on."""
-    bench, wanted, compensation = NxtBench(seed), line(DRIVE, 0.2, 40), TachoCompensation()
-    await bench.begin()
-    errors: list[float] = []
-    for _ in range(6):
-        before = await bench.tachos()
-        await bench.brick.move(legs(compensation.corrected(wanted) if compensated else wanted))
-        await bench.settle()
-        right, left = [now - then for now, then in zip(await bench.tachos(), before, strict=True)]
-        compensation.moved(wanted, (right, left))
-        errors += [right - wanted.right.angle_deg, left - wanted.left.angle_deg]
-    await bench.brick.close()
-    return max(map(abs, errors[2:]))
+    return max(map(abs, await errors_of_lines(seed, compensated)))
 
 
 def main(robots: int = ROBOTS, strings: int = STRINGS) -> None:

@@ -6,7 +6,7 @@ import asyncio
 import math
 from dataclasses import dataclass
 
-from daemon.loops.differential import DifferentialDrive, Move, wrap_angle
+from daemon.loops.differential import DifferentialDrive, Move, TachoCompensation, line, wrap_angle
 from daemon.loops.odometry import Pose
 from daemon.loops.pose_feedback import AlignedTurns, GearPlay, GoalSeeker, Phase, SeekSettings, Tolerance
 from drivers.nxt.brick import Brick, Legs
@@ -106,3 +106,19 @@ class NxtBench:
 
     async def _turn(self, port: Output) -> tuple[float, float]:
         return math.radians((await self.brick.output(port)).tacho_deg), self._loop.time()
+
+
+async def errors_of_lines(seed: int, compensated: bool) -> list[float]:
+    """By how much [deg] each wheel misses its angle in the second and the following ones of six lines."""
+    bench, wanted, compensation = NxtBench(seed), line(DRIVE, 0.2, 40), TachoCompensation()
+    await bench.begin()
+    errors: list[float] = []
+    for _ in range(6):
+        before = await bench.tachos()
+        await bench.brick.move(legs(compensation.corrected(wanted) if compensated else wanted))
+        await bench.settle()
+        right, left = [now - then for now, then in zip(await bench.tachos(), before, strict=True)]
+        compensation.moved(wanted, (right, left))
+        errors += [right - wanted.right.angle_deg, left - wanted.left.angle_deg]
+    await bench.brick.close()
+    return errors[2:]

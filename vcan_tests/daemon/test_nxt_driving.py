@@ -5,10 +5,10 @@ from collections.abc import AsyncIterator
 
 import pytest
 
-from daemon.loops.differential import TachoCompensation, bend, line
+from daemon.loops.differential import bend, line
 from daemon.loops.odometry import Pose
 from daemon.loops.pose_feedback import Phase, SeekSettings
-from vcan_tests.daemon.nxt_bench import DRIVE, SEEK, NxtBench, legs
+from vcan_tests.daemon.nxt_bench import DRIVE, SEEK, NxtBench, errors_of_lines, legs
 
 HALF_A_CENTIMETRE, THREE_DEGREES = 0.005, math.radians(3)
 GOALS = {
@@ -66,22 +66,6 @@ async def test_an_open_loop_line_overshoots_as_the_report_says() -> None:
     turned = await fresh.tachos()
     await fresh.brick.close()
     assert all(20 < turn - leg.angle_deg < 60 for leg, turn in zip(wanted, turned, strict=True)), turned
-
-
-async def errors_of_lines(seed: int, compensated: bool) -> list[float]:
-    """By how much [deg] each wheel misses its angle in the second and the following ones of six lines."""
-    bench, wanted, compensation = NxtBench(seed), line(DRIVE, 0.2, 40), TachoCompensation()
-    await bench.begin()
-    errors: list[float] = []
-    for _ in range(6):
-        before = await bench.tachos()
-        await bench.brick.move(legs(compensation.corrected(wanted) if compensated else wanted))
-        await bench.settle()
-        right, left = [now - then for now, then in zip(await bench.tachos(), before, strict=True)]
-        compensation.moved(wanted, (right, left))
-        errors += [right - wanted.right.angle_deg, left - wanted.left.angle_deg]
-    await bench.brick.close()
-    return errors[2:]
 
 
 async def test_the_firmware_itself_makes_up_for_what_the_last_move_overshot() -> None:

@@ -10,19 +10,25 @@ import pytest
 from profiles.loader import LoadedProfile, ProfileError, load
 
 HEAD = "schema_version: 1\nname: lab\nextends: max2d\n"
-"""Three lines that every test robot begins with; what a test adds begins on line 4."""
+"""Three lines that most test robots begin with; what a test adds begins on line 4."""
 
 Robot = Callable[[str], LoadedProfile]
 Mistakes = Callable[[str], list[str]]
 
 
 @pytest.fixture
-def robot(tmp_path: Path) -> Robot:
-    """Load a robot that extends the MAX2D by some YAML."""
+def head() -> str:
+    """What a test robot begins with; a room with another robot overrides it."""
+    return HEAD
+
+
+@pytest.fixture
+def robot(head: str, tmp_path: Path) -> Robot:
+    """Load a robot that extends the head's by some YAML."""
 
     def load_it(yaml: str) -> LoadedProfile:
         path = tmp_path / "lab.yaml"
-        path.write_text(HEAD + yaml, encoding="utf-8")
+        path.write_text(head + yaml, encoding="utf-8")
         return load(path)
 
     return load_it

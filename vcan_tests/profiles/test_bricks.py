@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -10,25 +9,15 @@ import pytest
 from profiles.bricks import DifferentialGeometry
 from profiles.json_schema import json_schema
 from profiles.loader import ProfileError, load
+from vcan_tests.profiles.conftest import Mistakes
 
-HEAD = "schema_version: 1\nextends: nxt\n"
 ARM = "{output: A, wheel_radius_m: 0.01, max_speed_m_s: 0.1, quick_stop_m_s2: 1}"
-
-Mistakes = Callable[[str], list[str]]
 
 
 @pytest.fixture
-def mistakes(tmp_path: Path) -> Mistakes:
-    """The mistakes of a robot that extends the NXT by some YAML, from line 3 on."""
-
-    def collect(yaml: str) -> list[str]:
-        path = tmp_path / "lab.yaml"
-        path.write_text(HEAD + yaml, encoding="utf-8")
-        with pytest.raises(ProfileError) as caught:
-            load(path)
-        return [str(mistake).removeprefix(f"{tmp_path}/") for mistake in caught.value.mistakes]
-
-    return collect
+def head() -> str:
+    """Of a robot that extends the NXT; what a test adds begins on line 3."""
+    return "schema_version: 1\nextends: nxt\n"
 
 
 def test_the_nxt_has_the_reports_wheels_and_track() -> None:

@@ -2,31 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from profiles.loader import ProfileError, load
 from profiles.schema import OmniGeometry
-
-HEAD = "schema_version: 1\nextends: turtle\n"
-
-Mistakes = Callable[[str], list[str]]
+from vcan_tests.profiles.conftest import Mistakes
 
 
 @pytest.fixture
-def mistakes(tmp_path: Path) -> Mistakes:
-    """The mistakes of a robot that extends the turtle by some YAML, from line 3 on."""
-
-    def collect(yaml: str) -> list[str]:
-        path = tmp_path / "lab.yaml"
-        path.write_text(HEAD + yaml, encoding="utf-8")
-        with pytest.raises(ProfileError) as caught:
-            load(path)
-        return [str(mistake).removeprefix(f"{tmp_path}/") for mistake in caught.value.mistakes]
-
-    return collect
+def head() -> str:
+    """Of a robot that extends the turtle; what a test adds begins on line 3."""
+    return "schema_version: 1\nextends: turtle\n"
 
 
 def test_the_turtles_wheels_roll_as_its_report_says() -> None:
