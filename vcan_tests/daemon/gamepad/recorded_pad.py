@@ -20,6 +20,22 @@ FULL = 32767
 REPORT = make_event(Event(EV_SYN, SYN_REPORT, 0))
 
 
+def stick_events(axis: str, share: float) -> bytes:
+    """A stick moves to a share of its way."""
+    return make_event(Event(EV_ABS, AXES[axis], round(share * FULL))) + REPORT
+
+
+def button_events(button: str, *, down: bool) -> bytes:
+    """A button is pressed or let go of."""
+    return make_event(Event(EV_KEY, BUTTONS[button], int(down))) + REPORT
+
+
+def untouched() -> Snapshot:
+    """Sticks in their middle, nothing pressed."""
+    codes = [AXES[stick] for stick in STICKS]
+    return Snapshot(dict.fromkeys(codes, 0), dict.fromkeys(codes, (-FULL - 1, FULL)), set())
+
+
 class RecordedPad:
     """A pad with two sticks of -32768 to 32767, as the kernel's xpad driver makes them.
 
@@ -29,10 +45,8 @@ class RecordedPad:
     """
 
     def __init__(self, name: str = "Recorded Pad", pressed: tuple[str, ...] = ()) -> None:
-        codes = [AXES[stick] for stick in STICKS]
-        self.truth = Snapshot(
-            dict.fromkeys(codes, 0), dict.fromkeys(codes, (-FULL - 1, FULL)), {BUTTONS[button] for button in pressed}
-        )
+        self.truth = untouched()
+        self.truth.pressed |= {BUTTONS[button] for button in pressed}
         self.pad = Pad(name, self.look)
 
     def look(self) -> Snapshot:
@@ -41,19 +55,18 @@ class RecordedPad:
 
     def moves(self, axis: str, share: float) -> bytes:
         """Move a stick to a share of its way; the events."""
-        raw = round(share * FULL)
-        self.truth.axes[AXES[axis]] = raw
-        return make_event(Event(EV_ABS, AXES[axis], raw)) + REPORT
+        self.truth.axes[AXES[axis]] = round(share * FULL)
+        return stick_events(axis, share)
 
     def presses(self, button: str) -> bytes:
         """Press a button; the events."""
         self.truth.pressed.add(BUTTONS[button])
-        return make_event(Event(EV_KEY, BUTTONS[button], 1)) + REPORT
+        return button_events(button, down=True)
 
     def lets_go(self, button: str) -> bytes:
         """Let go of a button; the events."""
         self.truth.pressed.discard(BUTTONS[button])
-        return make_event(Event(EV_KEY, BUTTONS[button], 0)) + REPORT
+        return button_events(button, down=False)
 
     def move(self, axis: str, share: float) -> None:
         """Move a stick, and let the pad read it."""

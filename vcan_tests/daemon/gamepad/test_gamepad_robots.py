@@ -22,6 +22,7 @@ from vcan_tests.robot import Robot, running_robot
 
 RADIUS_OF_NXT_M = 0.028
 AT_REST_M_S = 0.01
+UNWINDING_M = 0.04
 LEVER_M = 0.2
 """At which a turn counts as a speed."""
 
@@ -61,13 +62,21 @@ class Hands:
             return max(abs(motor.speed_rad_s) for motor in body_of(self.robot).brick.motors) * RADIUS_OF_NXT_M
         return max(self.robot.speed_m_s, LEVER_M * abs(self.robot.network.world.velocity[2]))
 
+    @property
+    def place(self) -> tuple[float, float]:
+        """Where it really is."""
+        if self.robot.app.profile.name == "nxt":
+            return pose_of(self.robot).x_m, pose_of(self.robot).y_m
+        x, y, _ = self.robot.network.world.pose
+        return x, y
+
     async def rests_within(self, limit_s: float) -> None:
-        """It comes to rest, and stays there."""
-        took_s = await self.robot.until(lambda: self.speed_m_s < AT_REST_M_S)
-        await asyncio.sleep(max(0.0, limit_s - took_s))
-        assert self.speed_m_s < AT_REST_M_S
+        """It comes to rest, and stays there but for tyres that unwind when the power goes off."""
+        await self.robot.until(lambda: self.speed_m_s < AT_REST_M_S, timeout_s=limit_s)
+        rested_at = self.place
         await asyncio.sleep(2.0)
         assert self.speed_m_s < AT_REST_M_S
+        assert math.dist(self.place, rested_at) < UNWINDING_M
 
 
 @asynccontextmanager
