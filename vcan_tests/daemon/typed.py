@@ -13,6 +13,7 @@ import io
 import logging
 import os
 import re
+import runpy
 import select
 import shlex
 import socket
@@ -271,7 +272,7 @@ class Typist:
         if command.startswith("canhelm run "):
             self._start_daemon(shlex.split(command)[1:])
             return []
-        if not command.startswith("canhelm "):
+        if not command.startswith(("canhelm ", "python ")):
             return subprocess.run(command, shell=True, check=True, capture_output=True, text=True).stdout.splitlines()
         shown: list[str] = []
 
@@ -284,7 +285,8 @@ class Typist:
             os.write(self._keys, f"{answered}\n".encode())
 
         with contextlib.redirect_stdout(Screen(shown, None)), contextlib.redirect_stderr(Screen(shown, answer)):
-            main(shlex.split(command)[1:])
+            program, *arguments = shlex.split(command)
+            main(arguments) if program == "canhelm" else runpy.run_path(arguments[0])
         text = "".join(shown).replace(f"{self.folder}/", "~/")
         return [line.rstrip() for line in text.splitlines()]
 
@@ -312,7 +314,7 @@ class Typist:
 
 def files_of(page: str) -> dict[str, str]:
     """The files that a page shows, by their names: a block below a line that ends in the file's name."""
-    return dict(re.findall(r"`([\w.-]+\.yaml)`:\n\n```yaml\n(.*?)```", page, re.DOTALL))
+    return dict(re.findall(r"`([\w.-]+)`:\n\n```\w+\n(.*?)```", page, re.DOTALL))
 
 
 def played(page: str, typist: Typist) -> str:
