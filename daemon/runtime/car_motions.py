@@ -9,7 +9,8 @@ from canhelm.errors import DeviceFault
 from daemon.loops.ackermann_drive import CarLaw, CarRecord, CarTarget
 from daemon.loops.measurement import Command, Measurement
 from daemon.loops.truck_odometry import TruckOdometry
-from daemon.runtime.motions import Motion, pose_result
+from daemon.runtime.motions import Motion
+from daemon.runtime.poses import place_and_heading
 from daemon.runtime.rest import AT_REST_M_S
 from daemon.runtime.streams import Streamed
 
@@ -74,7 +75,7 @@ class CarMotion(Motion):
 
     def _result(self, now_s: float) -> dict[str, Any]:
         return {
-            **pose_result(self._senses.odometry.pose),
+            **place_and_heading(self._senses.odometry.pose),
             "heading_error_deg": round(math.degrees(self._last_error_rad), 3),
             "duration_s": round(now_s - self.begun_s, 3),
         }

@@ -21,9 +21,10 @@ from daemon.runtime.motions import Motion
 from daemon.runtime.path_building import build_path
 from daemon.runtime.path_commands import PathRequest
 from daemon.runtime.path_motions import FollowedPath, PathMotion
+from daemon.runtime.poses import place_and_yaw
 from daemon.runtime.steered_vehicle import SteeredVehicle
 from daemon.runtime.streams import valid_for_s
-from daemon.runtime.vehicle import Stick, both_ways, odometry_status, require_at_most
+from daemon.runtime.vehicle import Stick, both_ways, require_at_most
 from drivers.contract import Drive, SteeringEncoder
 from profiles.schema import Profile
 from profiles.steered import CarGeometry
@@ -176,7 +177,7 @@ class CarVehicle(SteeredVehicle):
             "type": self._geometry.type,
             "methods": list(self.methods),
             "steering_deg": round(math.degrees(self.encoders[0].heading_rad), 3),
-            "odometry": odometry_status(pose),
+            "odometry": place_and_yaw(pose),
         }
 
 

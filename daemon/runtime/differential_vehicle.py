@@ -17,8 +17,9 @@ from daemon.loops.pose_feedback import REPORT_GAINS, SLOW_CYCLE_GAINS, SeekSetti
 from daemon.runtime.differential_motions import BrickMoves, BrickWheels, PoseMotion
 from daemon.runtime.differential_stream import DifferentialStream, SetPoint
 from daemon.runtime.motions import Motion
+from daemon.runtime.poses import place_and_yaw
 from daemon.runtime.streams import valid_for_s
-from daemon.runtime.vehicle import Stick, Vehicle, both_ways, odometry_status, require_at_most
+from daemon.runtime.vehicle import Stick, Vehicle, both_ways, require_at_most
 from drivers.contract import Drive
 from drivers.nxt.motors import NxtDrive
 from profiles.bricks import DifferentialGeometry, NxtMotorConfig
@@ -185,7 +186,7 @@ class DifferentialVehicle(Vehicle):
         return {
             "type": DifferentialGeometry.type,
             "methods": list(self.methods),
-            "odometry": odometry_status(pose),
+            "odometry": place_and_yaw(pose),
             "velocity": {
                 "forward_m_s": round((right + left) / 2, 4) + 0.0,
                 "yaw_rate_deg_s": round(math.degrees((right - left) / 2 / self._drive.half_track_m), 2) + 0.0,

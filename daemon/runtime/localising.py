@@ -13,11 +13,11 @@ from canhelm.errors import NotReady, UsageError
 from daemon.loops.articulated import ArticulatedVehicle
 from daemon.loops.localisation import composed, inverted
 from daemon.loops.odometry import Pose
-from daemon.loops.path import wrap
 from daemon.loops.path_driving import VehicleReading
 from daemon.loops.pose_filter import Correction, FilterNoise, PoseFilter, SeenBearing
 from daemon.runtime.events import EventLog
 from daemon.runtime.handlers import Handler, Params
+from daemon.runtime.poses import place_and_heading
 from daemon.runtime.vehicle import Vehicle
 from profiles.localisation import LocalisationConfig
 
@@ -151,9 +151,7 @@ class Localiser:
         age_s = asyncio.get_running_loop().time() - self._last_scan_s
         return {
             "state": "waiting" if covariance is None else "odometry" if age_s > STALE_S else "fixed",
-            "x_m": round(pose.x_m, 4),
-            "y_m": round(pose.y_m, 4),
-            "heading_deg": round(math.degrees(wrap(pose.yaw_rad)), 3),
+            **place_and_heading(pose),
             "position_std_m": None if covariance is None else round(covariance.position_m, 4),
             "heading_std_deg": None if covariance is None else round(math.degrees(math.sqrt(covariance.tt)), 3),
             "scan_age_s": round(age_s, 3) if math.isfinite(age_s) else None,

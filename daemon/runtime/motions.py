@@ -10,21 +10,10 @@ from typing import Any, TypeVar
 
 from canhelm.errors import CanhelmError, Refused
 from daemon.loops.measurement import Command, Measurement
-from daemon.loops.odometry import Pose
-from daemon.loops.path import wrap
 from daemon.runtime.streams import Streamed
 from drivers.contract import Drive, DriveState
 
 T = TypeVar("T")
-
-
-def pose_result(pose: Pose) -> dict[str, float]:
-    """A pose for the result of a motion."""
-    return {
-        "x_m": round(pose.x_m, 4) + 0.0,
-        "y_m": round(pose.y_m, 4) + 0.0,
-        "heading_deg": round(math.degrees(wrap(pose.yaw_rad)), 3) + 0.0,
-    }
 
 
 class Motion(ABC):

@@ -11,7 +11,8 @@ from daemon.loops.omni_drive import OmniLaw, OmniRecord
 from daemon.loops.omni_guide import Twist, TwistGuide
 from daemon.loops.omni_senses import OmniSenses
 from daemon.loops.planner import PlanarState, Result
-from daemon.runtime.motions import Motion, pose_result
+from daemon.runtime.motions import Motion
+from daemon.runtime.poses import place_and_heading
 from daemon.runtime.streams import Streamed
 
 FAILED = (Result.INVALID, Result.GOAL_TOO_FAST)
@@ -62,7 +63,7 @@ class OmniMotion(Motion):
     def numbers(self, measurement: Measurement) -> dict[str, Any]:
         """Where the robot is, and how it went."""
         return {
-            **pose_result(self._senses.pose),
+            **place_and_heading(self._senses.pose),
             "duration_s": round(measurement.time_s - self.begun_s, 3),
             "least_safety_factor": round(self.least_factor, 3),
             "slip_steps": self.slip_steps,

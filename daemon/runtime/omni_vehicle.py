@@ -18,9 +18,10 @@ from daemon.loops.slip import THRESHOLD_M_S2
 from daemon.loops.traction import Traction, TractionTuning
 from daemon.runtime.motions import Motion
 from daemon.runtime.omni_motions import GoalMotion, OmniMotion, TwistMotion, TwistStream
+from daemon.runtime.poses import place_and_yaw
 from daemon.runtime.rest import AT_REST_M_S
 from daemon.runtime.streams import valid_for_s
-from daemon.runtime.vehicle import Stick, Vehicle, both_ways, odometry_status, require_at_most
+from daemon.runtime.vehicle import Stick, Vehicle, both_ways, require_at_most
 from drivers.contract import Accelerometer as Sensor
 from drivers.contract import Drive, DriveState
 from profiles.schema import OmniGeometry, Profile
@@ -205,7 +206,7 @@ class OmniVehicle(Vehicle):
         return {
             "type": OmniGeometry.type,
             "methods": list(self.methods),
-            "odometry": odometry_status(pose),
+            "odometry": place_and_yaw(pose),
             "velocity": {
                 "forward_m_s": round(vx, 4),
                 "left_m_s": round(vy, 4),

@@ -8,7 +8,8 @@ from typing import Any, Protocol
 from daemon.loops.measurement import Command, Measurement
 from daemon.loops.odometry import Pose
 from daemon.loops.own_vehicle import OwnVehicle, Twist
-from daemon.runtime.motions import Motion, pose_result
+from daemon.runtime.motions import Motion
+from daemon.runtime.poses import place_and_heading
 from daemon.runtime.rest import AT_REST_M_S
 from daemon.runtime.streams import Streamed
 
@@ -65,7 +66,7 @@ class OwnMotion(Motion):
     def on_rest(self, measurement: Measurement) -> None:
         """At rest without a target."""
         duration_s = round(measurement.time_s - self.begun_s, 3)
-        self.finish({**pose_result(self._senses.pose), "duration_s": duration_s})
+        self.finish({**place_and_heading(self._senses.pose), "duration_s": duration_s})
 
     def progress(self) -> dict[str, Any]:
         """The target, and the time left."""

@@ -13,8 +13,9 @@ from daemon.loops.odometry import MAX_STEP_M, Pose, moved_along_arc
 from daemon.loops.own_vehicle import OwnVehicle, Twist
 from daemon.runtime.motions import Motion
 from daemon.runtime.own_motions import OwnMotion, OwnStream
+from daemon.runtime.poses import place_and_yaw
 from daemon.runtime.streams import valid_for_s
-from daemon.runtime.vehicle import Stick, Vehicle, both_ways, odometry_status, require_at_most
+from daemon.runtime.vehicle import Stick, Vehicle, both_ways, require_at_most
 from drivers.contract import Brake, Drive, SteeringEncoder
 from profiles.own_class import load_class
 from profiles.own_vehicle import OwnGeometry
@@ -134,7 +135,7 @@ class OwnKindVehicle(Vehicle):
             "kind": self._geometry.kind,
             "methods": list(self.methods),
             "failure": self.failure,
-            "odometry": odometry_status(self.pose),
+            "odometry": place_and_yaw(self.pose),
             "velocity": {
                 "forward_m_s": round(forward, 4),
                 "left_m_s": round(left, 4),

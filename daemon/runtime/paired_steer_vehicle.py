@@ -30,6 +30,7 @@ from daemon.runtime.paired_steer_motions import PairedSteerMotion, StreamMotion
 from daemon.runtime.path_building import build_path
 from daemon.runtime.path_commands import PathRequest
 from daemon.runtime.path_in_pieces import PiecesPlan
+from daemon.runtime.poses import place_and_yaw
 from daemon.runtime.streams import valid_for_s
 from daemon.runtime.vehicle import Stick, Vehicle, both_ways
 from drivers.contract import Brake, Drive, SteeringEncoder
@@ -162,7 +163,6 @@ class PairedSteerVehicle(Vehicle):
 
     def status(self) -> dict[str, Any]:
         """Headings and odometry."""
-        pose = self.odometry.pose
         return {
             "type": self.geometry.type,
             "methods": list(self.methods),
@@ -170,9 +170,5 @@ class PairedSteerVehicle(Vehicle):
                 name: round(math.degrees(encoder.heading_rad), 3)
                 for name, encoder in zip(PAIR_NAMES, self.encoders, strict=True)
             },
-            "odometry": {
-                "x_m": round(pose.x_m, 4),
-                "y_m": round(pose.y_m, 4),
-                "yaw_deg": round(math.degrees(pose.yaw_rad), 3),
-            },
+            "odometry": place_and_yaw(self.odometry.pose),
         }

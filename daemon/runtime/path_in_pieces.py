@@ -11,10 +11,11 @@ from daemon.loops.odometry import Odometry
 from daemon.loops.paired_steer import PairedSteerLaw
 from daemon.loops.paired_steer_piece import DrivenPiece, aimed, target_of
 from daemon.loops.paired_steer_target import PairedSteerTarget
-from daemon.loops.path import Path, wrap
+from daemon.loops.path import Path
 from daemon.loops.path_in_pieces import distance
 from daemon.runtime.paired_steer_motions import PairedSteerMotion
 from daemon.runtime.path_commands import PathPlan
+from daemon.runtime.poses import place_and_heading
 from profiles.schema import Limits, PairedSteerGeometry
 
 AT_BEGIN_M = 0.05
@@ -180,9 +181,7 @@ class PathInPieces(PairedSteerMotion):
         return {
             **self._summary,
             "driven_deviation_m": round(max(self.driven_m), 4),
-            "x_m": round(pose.x_m, 4),
-            "y_m": round(pose.y_m, 4),
-            "heading_deg": round(math.degrees(wrap(pose.yaw_rad)), 3),
+            **place_and_heading(pose),
             "error_m": round(math.hypot(pose.x_m - end.x_m, pose.y_m - end.y_m), 4),
             "duration_s": round(now_s - self.begun_s, 3),
             "pieces": told,

@@ -16,6 +16,7 @@ from daemon.loops.path_speed import SpeedTuning
 from daemon.loops.steered_axle import SteeredAxleLaw
 from daemon.runtime.motions import Motion
 from daemon.runtime.path_commands import PathPlan
+from daemon.runtime.poses import place_and_heading
 from profiles.steered import SteeredAxle
 
 KIND = "drive.path"
@@ -105,9 +106,7 @@ class PathMotion(Motion):
         end_m = last.length_m if math.isfinite(last.length_m) else last.project(unit.x_m, unit.y_m)[0]
         turned = wrap(unit.yaw_rad - last.heading(end_m))
         return {
-            "x_m": round(unit.x_m, 4),
-            "y_m": round(unit.y_m, 4),
-            "heading_deg": round(math.degrees(wrap(unit.yaw_rad)), 3),
+            **place_and_heading(unit),
             "end_error_m": round(math.dist(last.point(end_m), (unit.x_m, unit.y_m)), 4),
             "end_heading_error_deg": round(math.degrees(turned), 3),
             "largest_error_m": round(self.largest_error_m, 4),

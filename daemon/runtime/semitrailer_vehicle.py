@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import Any, Final
 
-from canhelm.errors import LimitExceeded, Refused
+from canhelm.errors import Refused
 from daemon.loops.articulated import ArticulatedVehicle, Hitch
 from daemon.loops.bending_observer import BendingObserver
 from daemon.loops.measurement import Measurement
@@ -20,10 +20,11 @@ from daemon.runtime.motions import Motion
 from daemon.runtime.path_building import build_path
 from daemon.runtime.path_commands import PathRequest
 from daemon.runtime.path_motions import FollowedPath, PathMotion
+from daemon.runtime.poses import place_and_yaw
 from daemon.runtime.steered_vehicle import SteeredVehicle
 from daemon.runtime.streams import valid_for_s
 from daemon.runtime.truck_stream import TruckStream
-from daemon.runtime.vehicle import Stick, both_ways
+from daemon.runtime.vehicle import Stick, both_ways, require_at_most
 from drivers.contract import Drive, SteeringEncoder
 from profiles.schema import Profile
 from profiles.steered import SemitrailerGeometry
@@ -34,7 +35,6 @@ BENDING_SHARE: Final = 0.6
 """Likewise of the bending angle."""
 STEERING_PER_WAY_DEG_M: Final = 300.0
 """Backwards the speed leaves the steering so much time for each metre: what the laws were tuned for."""
-_ROUNDING: Final = 1e-9
 
 
 class SemitrailerVehicle(SteeredVehicle):
@@ -117,13 +117,7 @@ class SemitrailerVehicle(SteeredVehicle):
             raise Refused("this truck turns by its steering angle only", remedy=remedy)
         speed, steering_deg = float(params["speed_m_s"]), float(params.get("steering_deg") or 0.0)
         self._speed(abs(speed))
-        if abs(steering_deg) > self.axle.limit_deg * (1 + _ROUNDING):
-            raise LimitExceeded(
-                f"a steering angle of {steering_deg:g} deg is beyond the limit",
-                value=steering_deg,
-                limit=f"limit_deg {self.axle.limit_deg:g}",
-                remedy=f"ask for {-self.axle.limit_deg:g} to {self.axle.limit_deg:g} deg",
-            )
+        require_at_most("steering angle", abs(steering_deg), self.axle.limit_deg, "deg", "limit_deg")
         return TruckTarget(speed, math.radians(steering_deg))
 
     def sticks(self) -> dict[str, Stick]:
@@ -151,13 +145,7 @@ class SemitrailerVehicle(SteeredVehicle):
     def _speed(self, wanted_m_s: float | None) -> SpeedTuning:
         limits = self.profile.limits
         top = limits.speed_m_s if wanted_m_s is None else wanted_m_s
-        if top > limits.speed_m_s * (1 + _ROUNDING):
-            raise LimitExceeded(
-                f"a speed of {top:g} m/s is beyond the limit",
-                value=top,
-                limit=f"speed_m_s {limits.speed_m_s:g}",
-                remedy=f"ask for at most {limits.speed_m_s:g} m/s",
-            )
+        require_at_most("speed", top, limits.speed_m_s, "m/s", "speed_m_s")
         return SpeedTuning(top, limits.acceleration_m_s2, limits.lateral_acceleration_m_s2, self._backward_m_s)
 
     @property
@@ -185,14 +173,6 @@ class SemitrailerVehicle(SteeredVehicle):
             "steering_deg": round(math.degrees(reading.steering_rad), 3),
             "bending_deg": round(math.degrees(reading.bending_rad[0]), 3),
             "jackknife_margin_deg": round(math.degrees(self.kinematics.jackknife_margin(reading.bending_rad)), 3),
-            "odometry": _shown(truck),
-            "trailer": _shown(trailer),
+            "odometry": place_and_yaw(truck),
+            "trailer": place_and_yaw(trailer),
         }
-
-
-def _shown(pose: Pose) -> dict[str, float]:
-    return {
-        "x_m": round(pose.x_m, 4),
-        "y_m": round(pose.y_m, 4),
-        "yaw_deg": round(math.degrees(pose.yaw_rad), 3),
-    }

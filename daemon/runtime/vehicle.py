@@ -10,7 +10,6 @@ from typing import Any, Final
 from canhelm.errors import LimitExceeded
 from daemon.loops.limits import Gate
 from daemon.loops.measurement import Command, Measurement
-from daemon.loops.odometry import Pose
 from daemon.runtime.motions import Motion
 from daemon.runtime.streams import valid_for_s
 from drivers.contract import Brake, BrakeState, Drive, SteeringEncoder
@@ -50,15 +49,6 @@ def require_at_most(what: str, value: float, limit: float, unit: str, name: str)
             limit=f"{name} {allowed:g}",
             remedy=f"ask for at most {allowed:g} {unit}",
         )
-
-
-def odometry_status(pose: Pose) -> dict[str, float]:
-    """A pose for ``status``; its angle is not wrapped."""
-    return {
-        "x_m": round(pose.x_m, 4) + 0.0,
-        "y_m": round(pose.y_m, 4) + 0.0,
-        "yaw_deg": round(math.degrees(pose.yaw_rad), 3) + 0.0,
-    }
 
 
 class Vehicle(ABC):
