@@ -103,7 +103,7 @@ async def test_two_wheels_on_can_are_driven_by_the_same_law(tmp_path: Path) -> N
         result = await robot.call("drive.to", x_m=0.5, y_m=0.2, heading_deg=90.0)
         assert result["error_m"] < 0.004
         assert abs(result["heading_error_deg"]) < 3.0
-        assert robot.app.vehicle.methods == ("drive.to",)
+        assert robot.app.vehicle.methods == ("drive.to", "drive.set")
 
 
 async def test_a_robot_waits_for_its_brick(gripper: Profile) -> None:
