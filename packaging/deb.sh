@@ -4,8 +4,10 @@ set -eu
 cd "$(dirname "$0")/.."
 version=$(sed -n 's/^__version__ = "\(.*\)"/\1/p' canhelm/__init__.py)
 architecture=$(dpkg --print-architecture)
+mkdir -p dist
 root=$(mktemp -d)
-trap 'rm -rf "$root"' EXIT
+finished=$(mktemp -d dist/.new-XXXXXX) # what reads dist/ meanwhile shall never see half a package
+trap 'rm -rf "$root" "$finished"' EXIT
 chmod 755 "$root"
 umask 022
 
@@ -21,5 +23,5 @@ sed -e "s/@VERSION@/${VERSION:-$version}/" -e "s/@ARCHITECTURE@/$architecture/" 
 (cd "$root" && find etc -type f -printf '/%p\n') >"$root/DEBIAN/conffiles"
 (cd "$root" && find opt usr -type f -print0 | xargs -0 md5sum) >"$root/DEBIAN/md5sums"
 
-mkdir -p dist
-dpkg-deb --root-owner-group -Zgzip --build "$root" dist
+dpkg-deb --root-owner-group -Zgzip --build "$root" "$finished"
+mv "$finished"/*.deb dist

@@ -113,7 +113,11 @@ class SlcanAdapter:
         os.write(self._adapter, line.encode() + b"\r")
 
     def _carry(self) -> None:
-        """The adapter's own life: takes what the kernel says, and carries frames between it and the wire."""
+        """The adapter's own life: takes what the kernel says, and carries frames between it and the wire.
+
+        It stands for a device, which waits for no program, so it goes before them.
+        """
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), -20)
         unfinished = b""
         wire = self._wire.fileno() if self._wire else -1
         sources = [source for source in (self._adapter, self._stop_reader, wire) if source >= 0]

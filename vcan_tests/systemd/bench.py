@@ -24,6 +24,7 @@ from profiles.loader import load
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "dist" / f"canhelm_{canhelm.__version__}_amd64.deb"
 BUS = "vcan0"
+BUS_SPEC = f"socketcan:{BUS}"
 SERVICE = "canhelm@max2d.service"
 SOCKET_UNIT = "canhelm@max2d.socket"
 SIMULATOR = "simulator.service"
@@ -33,9 +34,10 @@ SETTINGS = Path("/etc/canhelm/max2d.env")
 PATIENT = """\
 schema_version: 1
 extends: robots/max2d
-network: {cycle_hz: 20, guard_time_ms: 1000, life_time_factor: 4}
+network: {cycle_hz: 10, guard_time_ms: 1000, life_time_factor: 4, boot_deadline_s: 20, sdo_timeout_s: 1}
 """
-"""Few cycles, and guarding that outlives the pauses of a loaded machine; how fast it works is proven elsewhere."""
+"""Few cycles, and patience that outlives the pauses of a loaded machine: after one, a simulated network has to compute
+what has happened meanwhile, and answers late. How fast it works is proven elsewhere."""
 WITHIN_S = 60.0
 """Time that anything may take, on a machine that has other work as well."""
 
@@ -85,24 +87,39 @@ class Robot:
     async def make_idle(self) -> None:
         """Up, with all nodes, at rest, nothing latched; begins anew unless it is so already."""
         if not (self._as_installed() and self._is_idle()):
-            self.clear()
+            self._set_up()
             await self.begin()
 
     async def begin(self) -> None:
-        """Switch the motor power on and start the service; returns when it is idle."""
-        self.simulate()
+        """Switch the motor power on, if it is not, and start the service; returns when it is idle."""
+        if not self._has_all_nodes():
+            self.switch_off()
+            self.simulate()
         told("systemctl", "start", SERVICE)
+        self._watch_until_idle()
         await self.until_state("idle")
+
+    def _watch_until_idle(self) -> None:
+        """Listen to the daemon: to ask systemd again and again would keep the one processor from what is waited for."""
+        deadline_s = time.monotonic() + WITHIN_S
+        with Client(SOCKET) as client:
+            for method, status in client.notifications():
+                if method == "status" and status["state"] == "idle":
+                    return
+                assert time.monotonic() < deadline_s, (method, status)
 
     def clear(self) -> None:
         """Neither service nor network run; package, settings and profile are as they should be."""
+        self.switch_off()
+        self._set_up()
+
+    def _set_up(self) -> None:
         if not self._as_installed():
             told("dpkg", "--install", str(PACKAGE))
-        self.switch_off()
         tell("systemctl", "stop", SERVICE, SOCKET_UNIT)
         tell("systemctl", "reset-failed")
         PROFILE.write_text(PATIENT)
-        SETTINGS.write_text(f"CANHELM_BUS=socketcan:{BUS}\n")
+        SETTINGS.write_text(f"CANHELM_BUS={BUS_SPEC}\n")
 
     def _as_installed(self) -> bool:
         version = tell("dpkg-query", "--show", "--showformat=${db:Status-Status} ${Version}", "canhelm").stdout
@@ -113,16 +130,21 @@ class Robot:
             return False
         return self.show("StatusText") == "idle" and self.show("ActiveState", SIMULATOR) == "active"
 
+    def _has_all_nodes(self) -> bool:
+        return (self.show("ActiveState", SIMULATOR), self.show("Description", SIMULATOR)) == ("active", _described())
+
     # -- the network ----------------------------------------------------------------------------------------------
 
-    def simulate(self, *options: str, bus: str = f"socketcan:{BUS}") -> None:
+    def simulate(self, *options: str, bus: str = BUS_SPEC) -> None:
         """Switch the motor power on: the nodes begin to boot."""
-        run = ("systemd-run", "--quiet", "--collect", f"--unit={SIMULATOR}", "--property=Nice=-10")
+        properties = ("--property=Nice=-10", f"--property=Description={_described(*options, bus=bus)}")
+        run = ("systemd-run", "--quiet", "--collect", f"--unit={SIMULATOR}", *properties)
         told(*run, "/usr/bin/canhelm", "simulate", "--profile", "max2d", "--bus", bus, *options)
 
     def switch_off(self) -> None:
         """Take the motor power away."""
         tell("systemctl", "kill", "--signal=KILL", SIMULATOR)
+        tell("systemctl", "stop", SIMULATOR)
 
     def read(self, node: int, name: str) -> int:
         """An object of a drive, read over the bus as anybody could."""
@@ -204,6 +226,11 @@ class Robot:
         """The fastest wheel's speed."""
         speeds = [abs(float(node["speed_m_s"])) for node in self.status()["nodes"] if "speed_m_s" in node]
         return max(speeds)
+
+
+def _described(*options: str, bus: str = BUS_SPEC) -> str:
+    """The description of the unit in which a network is simulated."""
+    return " ".join((*options, "max2d on", bus))
 
 
 _MAX2D = load("max2d").profile

@@ -111,7 +111,7 @@ async def _measure() -> None:
     await journal.has("Deactivated successfully")
     print(journal.read("--output=short", "--no-hostname"))
     with tempfile.TemporaryDirectory() as folder:
-        for name, profile in (("with 20 cycles a second", PATIENT), ("as shipped", SHIPPED)):
+        for name, profile in (("with 10 cycles a second", PATIENT), ("as shipped", SHIPPED)):
             robot.clear()
             PROFILE.write_text(profile)
             await robot.begin()

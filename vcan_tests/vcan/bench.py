@@ -27,7 +27,7 @@ TIMEOUT_S = 40.0
 COMMAND = (sys.executable, "-m", "daemon")
 
 
-def patient(cycle_hz: int = 50) -> str:
+def patient(cycle_hz: int = 20) -> str:
     """More of a profile for tests that are not about time: it outlives the pauses of a loaded machine."""
     return (
         f"network: {{cycle_hz: {cycle_hz}, guard_time_ms: 500, life_time_factor: 20, "

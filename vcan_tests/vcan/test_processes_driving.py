@@ -21,7 +21,7 @@ Way = tuple[float, float, float]
 
 @pytest.fixture(scope="module")
 def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
-    with bench(tmp_path_factory.mktemp("driving"), patient()) as made:
+    with bench(tmp_path_factory.mktemp("driving"), patient(cycle_hz=50)) as made:
         yield made
 
 
