@@ -22,6 +22,7 @@ class StickConfig(Part, frozen=True, kw_only=True):
     """One command, and the axis that gives it; it has to spring back to its middle."""
 
     axis: AxisName
+    """Name of the axis, as `canhelm drive joystick --list` prints it."""
     sign: Literal[1, -1] = -1
     """1: the axis' growing values are forward, left or counter-clockwise. Pads count to the right and to the person."""
     dead_zone: Annotated[float, Meta(ge=0, le=0.9)] = 0.12

@@ -2,13 +2,32 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
 from canhelm.errors import ConfigError
 from profiles.gamepad import StickConfig
+from profiles.json_schema import json_schema
 from profiles.loader import load
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "gamepad.md"
+
+
+def test_what_the_documentation_shows_is_a_profile(tmp_path: Path) -> None:
+    (shown,) = re.findall(r"```yaml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    path = tmp_path / "mine.yaml"
+    path.write_text(f"schema_version: 1\nextends: robots/max2d\n{shown}")
+    gamepad = load(path).profile.gamepad
+    assert gamepad.speed == StickConfig(axis="ABS_Y", share=0.5)
+    assert gamepad.direction is None
+
+
+@pytest.mark.parametrize("name", ["GamepadConfig", "StickConfig"])
+def test_the_schema_says_what_each_key_means(name: str) -> None:
+    keys = json_schema()["$defs"][name]["properties"]
+    assert [key for key, value in keys.items() if "description" not in value] == []
 
 
 def loaded(folder: Path, text: str) -> Path:
