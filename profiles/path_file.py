@@ -44,7 +44,7 @@ class StartSpec(Part, frozen=True, kw_only=True):
     """Of the vehicle, counter-clockwise positive."""
 
 
-class PieceSpec(Part, frozen=True, kw_only=True, omit_defaults=True):
+class PieceSpec(Part, frozen=True, kw_only=True, omit_defaults=True, gc=False):
     """One piece: exactly one of ``line_m``, ``line_to_m``, ``arc_deg`` and ``waypoints_m``."""
 
     line_m: Positive | None = None

@@ -9,8 +9,10 @@ from __future__ import annotations
 import asyncio
 import math
 import zlib
-from dataclasses import astuple, replace
+from dataclasses import astuple
 from typing import Final
+
+from msgspec.structs import replace
 
 from canhelm.errors import CanhelmError
 from daemon.campaigns.cases import DURATION_S, PERIOD_S, SPEED_M_S, Case, Outcome

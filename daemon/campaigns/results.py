@@ -1,7 +1,7 @@
 """The results of a campaign: one row of a CSV file a finished run, kept as soon as the run is over.
 
 A campaign that was killed goes on where it was: what stands in the file is not driven again. A line that was cut short
-is taken away.
+is taken away. Runs of the same parts that the plan does not have, as of more random states, stay and are passed over.
 """
 
 from __future__ import annotations
@@ -80,11 +80,13 @@ class Results:
         if next(rows) != COLUMNS:
             raise self._foreign(1, "has other columns")
         planned = set(self._cases)
+        parts = {_part(case) for case in planned}
         for number, row in enumerate(rows, start=2):
             case, out = self._parsed(row, number)
-            if case not in planned:
+            if _part(case) not in parts:
                 raise self._foreign(number, "is a run that this campaign does not have")
-            self.finished[case] = out
+            if case in planned:
+                self.finished[case] = out
 
     def _parsed(self, row: list[str], number: int) -> Result:
         if len(row) != len(COLUMNS):
@@ -101,6 +103,10 @@ class Results:
     def _foreign(self, line: int, what: str) -> ConfigError:
         remedy = "give another folder with --out, or delete this file"
         return ConfigError(f"{self._path}:{line} {what}", object=str(self._path), remedy=remedy)
+
+
+def _part(case: Case) -> tuple[str | float | None, ...]:
+    return case.part, case.through, case.law, case.rate_deg_s
 
 
 @contextmanager

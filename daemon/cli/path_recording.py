@@ -12,10 +12,11 @@ from typing import Any, Literal, TextIO
 from canhelm.errors import Refused, UsageError
 from daemon.cli.motion import signals_interrupt
 from daemon.cli.options import Options
-from daemon.cli.output import say, show
+from daemon.cli.output import say, say_warning, show
 from daemon.loops.odometry import Pose
 from daemon.loops.path import Piece
 from daemon.loops.path_fitting import deviation, fit_pieces, split_runs
+from daemon.loops.record_smoothing import smoothed
 
 COLUMNS = ("time_s", "x_m", "y_m", "yaw_deg", "trailer_x_m", "trailer_y_m", "trailer_yaw_deg")
 """Of a record; the last three are empty for a vehicle without a trailer."""
@@ -84,11 +85,14 @@ def fit(name: str, out: str, tolerance_m: float, json: bool | None) -> int:
     with _opened(out, "x") as file:
         file.writelines(f"{line}\n" for line in _path_lines(name, runs))
     pieces = [piece for run in runs for piece in run.pieces]
+    off_m = max(deviation(run.poses, run.pieces) for run in runs)
+    if off_m > tolerance_m:
+        say_warning(f"the record scatters by more than the tolerance: a pose lies {off_m:.4f} m beside the path")
     numbers = {
         "file": out,
         "pieces": len(pieces),
         "length_m": round(math.fsum(piece.length_m for piece in pieces), 3),
-        "deviation_m": round(max(deviation(run.poses, run.pieces) for run in runs), 5),
+        "deviation_m": round(off_m, 5),
     }
     show(numbers, json=json)
     return 0
@@ -144,7 +148,7 @@ def _runs(trucks: list[Pose], trailers: list[Pose]) -> Iterator[tuple[bool, list
 
 
 def _fitted(backward: bool, poses: list[Pose], tolerance_m: float) -> Run:
-    return Run(poses, fit_pieces(poses, tolerance_m, backward))
+    return Run(poses, fit_pieces(smoothed(poses, tolerance_m), tolerance_m, backward))
 
 
 def _path_lines(name: str, runs: list[Run]) -> Iterator[str]:

@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from canhelm.errors import LimitExceeded, UsageError
+from profiles.parts import Part
 
 Point = tuple[float, float]
 
@@ -46,9 +46,8 @@ def wrap(angle_rad: float) -> float:
     return math.remainder(angle_rad, math.tau)
 
 
-@dataclass(frozen=True, slots=True)
-class Piece:
-    """A straight line or a circular arc.
+class Piece(Part, frozen=True, gc=False):
+    """A straight line or a circular arc; a hundred thousand of them cost the collector of garbage nothing.
 
     Attributes:
         x_m, y_m: beginning.

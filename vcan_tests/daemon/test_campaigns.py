@@ -73,6 +73,24 @@ def test_overshoot_is_the_largest_error_on_the_other_side() -> None:
     assert outcome(run).overshoot_m == -min(run.position_m) > 0.01
 
 
+def test_fewer_random_states_than_before_go_on_in_the_same_folder(tmp_path: Path) -> None:
+    out = drive_batch(FEW[:1])[0][1]
+    for count in (11, 10, 12):
+        plan = bounds_cases(count, 2009, "ideal")
+        with opened(tmp_path, plan) as results:
+            results.keep([(case, out) for case in results.missing])
+            assert results.in_order().keys() == set(plan)
+            assert len(results.finished) == len(plan)
+    assert len(rows(tmp_path)) == len(bounds_cases(12, 2009, "ideal"))
+
+
+def test_runs_through_can_are_no_runs_on_ideal_kinematics(tmp_path: Path) -> None:
+    with opened(tmp_path, bounds_cases(10, 2009, "can")) as results:
+        results.keep([(case, drive_batch(FEW[:1])[0][1]) for case in results.missing[:1]])
+    with pytest.raises(ConfigError, match="does not have"), opened(tmp_path, bounds_cases(10, 2009, "ideal")):
+        pass
+
+
 @pytest.mark.real_time
 def test_two_workers_find_what_one_finds() -> None:
     alone = dict(result for batch in drive_all(FEW, 1) for result in batch)

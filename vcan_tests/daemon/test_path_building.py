@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import math
 from typing import Any
 
@@ -175,6 +176,12 @@ async def test_two_kinds_in_one_piece_are_refused_by_its_number() -> None:
 
 async def test_an_empty_path_is_refused() -> None:
     assert "empty" in (await refused()).message
+
+
+async def test_a_long_path_gives_the_collector_of_garbage_nothing_to_look_through() -> None:
+    specs = [PieceSpec(line_m=0.01) for _ in range(1000)]
+    path = await built(*specs)
+    assert not any(map(gc.is_tracked, [*specs, *path.pieces]))
 
 
 async def test_while_a_long_path_is_built_others_have_their_turn() -> None:
