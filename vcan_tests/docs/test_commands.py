@@ -1,0 +1,88 @@
+"""Every command of the pages is carried out on a simulated robot, or is marked in the page with the reason why not."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from vcan_tests.docs.pages import Block, Command, blocks, pages
+from vcan_tests.docs.playground import Answer, Playground, parse, without_comment
+
+QUESTION = re.compile(r"\[y/N\] (\w+)")
+NUMBER = re.compile(r"\d+(\.\d+)?")
+AGREED = Path(__file__).with_name("not_carried_out.txt")
+"""Commands that need hardware, root, a person or much time; each page says which, in a comment before them."""
+
+
+@pytest.fixture
+def playground(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Playground]:
+    playground = Playground(tmp_path, monkeypatch)
+    yield playground
+    playground.close()
+
+
+def console_blocks(page: str) -> list[Block]:
+    return [block for block in blocks(pages()[page]) if block.language == "console" or block.file]
+
+
+PLAYED = ("docs/first-week.md",)
+"""Pages whose commands make one story, with a test of its own: `vcan_tests/daemon/test_first_week.py`."""
+PAGES = [page for page in pages() if page not in PLAYED and any(block.commands() for block in console_blocks(page))]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_the_commands_of_a_page_do_what_it_says(playground: Playground, tmp_path: Path, page: str) -> None:
+    for block in console_blocks(page):
+        if block.file:
+            (tmp_path / block.file).write_text(block.text, encoding="utf-8")
+            continue
+        for line in block.before.splitlines():
+            answer = playground.run(line)
+            assert answer.code == 0, f"{page}:{block.line}: before it: {line}: {answer.err}"
+        if not block.needs:
+            for command in block.commands():
+                check(page, command, playground.run(command.text, typed(command)))
+
+
+def typed(command: Command) -> str:
+    """What the page shows a person to answer to questions."""
+    return "".join(f"{answer}\n" for answer in QUESTION.findall("\n".join(command.shown)))
+
+
+def check(page: str, command: Command, answer: Answer) -> None:
+    """A command that fails, fails as the page says; what the page shows is what the command says, but for numbers."""
+    where = f"{page}:{command.line}: {command.text}"
+    told = masked(answer.out + answer.err)
+    if answer.code != 0:
+        assert masked(answer.err).strip() in masked("\n".join(command.shown)), f"{where}: {answer}"
+    for line in command.shown:
+        assert masked(QUESTION.sub("[y/N]", line)).strip(". ") in told, f"{where}: does not say {line!r}, but {answer}"
+
+
+def masked(text: str) -> str:
+    """Text without its numbers, the widths of its columns, and where its lines end."""
+    return " ".join(NUMBER.sub("0", text).split())
+
+
+def not_carried_out() -> list[str]:
+    """Every command that no test carries out, with the reason that its page gives."""
+    marked = [(page, block) for page in PAGES for block in console_blocks(page) if block.needs]
+    return [
+        f"{page}: {without_comment(command.text)} ({block.needs})"
+        for page, block in marked
+        for command in block.commands()
+    ]
+
+
+def test_no_command_is_left_out_by_accident() -> None:
+    agreed = AGREED.read_text(encoding="utf-8").splitlines()
+    assert [line for line in not_carried_out() if line not in agreed] == [], f"run them, or agree to them in {AGREED}"
+    assert [line for line in agreed if line not in not_carried_out()] == [], f"these are gone: take them from {AGREED}"
+
+
+@pytest.mark.parametrize("line", [line for line in not_carried_out() if ": canhelm " in line])
+def test_a_command_that_is_not_carried_out_is_one_that_the_parser_takes(line: str) -> None:
+    parse(line.partition(": ")[2].rpartition(" (")[0])
