@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import sys
 from collections.abc import Callable, Sequence
@@ -26,6 +25,7 @@ from daemon.calibration.readings import (
 from daemon.cli.calibrate_scale import square, straight
 from daemon.cli.options import DEFAULT, Options, agreed
 from daemon.cli.output import say, show
+from daemon.cli.pictures import can_draw, make_folder
 
 if TYPE_CHECKING:
     from daemon.calibration.fit import Fit
@@ -103,7 +103,7 @@ def _calibrate(kind: str, choices: Choices, planned: list[Station], question: Qu
 
     loaded = load(choices.profile)
     name = _encoder(kind, choices.encoder, list(loaded.profile.encoders))
-    _make_folder(choices.out)
+    make_folder(choices.out)
     if choices.readings is None:
         with options.client() as client:
             readings = _ask(client, name, planned, question, choices.out / f"{name}.csv")
@@ -127,13 +127,6 @@ def _encoder(kind: str, wanted: str | None, known: Sequence[str]) -> str:
         told = f"{wanted!r}" if wanted else f"whose name begins with {kind}"
         raise ConfigError(f"the profile has no encoder {told}", remedy=f"--encoder with one of: {', '.join(known)}")
     return name
-
-
-def _make_folder(out: Path) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UsageError(f"--out {out} cannot be made: {error.strerror}", remedy="name another folder") from None
 
 
 def _ask(client: Client, encoder: str, planned: list[Station], question: Question, kept: Path) -> list[Reading]:
@@ -219,8 +212,7 @@ def _summary(name: str, found: Fit) -> dict[str, Any]:
 
 
 def _draw(name: str, readings: Sequence[Reading], found: Fit, path: Path) -> None:
-    if importlib.util.find_spec("matplotlib") is None:
-        say("no picture: matplotlib is missing - pip install 'canhelm[plot]'")
+    if not can_draw():
         return
     from daemon.calibration.pictures import draw
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import os
 import time
@@ -14,6 +13,7 @@ from cyclopts import App, Parameter
 from cyclopts.validators import Number
 
 from daemon.cli.output import Json, console, say, show, wants_json, words
+from daemon.cli.pictures import can_draw
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -152,8 +152,7 @@ def _cell(value: Any) -> str:
 
 
 def _draw(what: Literal["bounds", "tuning"], finished: Mapping[Case, Outcome], out: Path) -> None:
-    if importlib.util.find_spec("matplotlib") is None:
-        say("no pictures: matplotlib is missing - pip install 'canhelm[plot]'")
+    if not can_draw():
         return
     from daemon.campaigns import pictures
 

@@ -11,15 +11,16 @@ from cyclopts import Parameter
 from canhelm.errors import UsageError
 from daemon.cli.demo_ackermann import demo_ackermann
 from daemon.cli.demo_max2d_path import demo_max2d_path
-from daemon.cli.demo_run import DemoRun, can_draw
+from daemon.cli.demo_run import DemoRun
 from daemon.cli.demo_semitrailer import demo_semitrailer
 from daemon.cli.demo_view import DemoView
 from daemon.cli.output import Json, say, show, words
+from daemon.cli.pictures import can_draw
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from daemon.demo import FigureResult
+    from daemon.demo import Figure, FigureResult
     from daemon.demo_nxt import NxtResult
     from daemon.demo_turtle import TurtleResult
     from profiles.schema import Profile
@@ -57,7 +58,7 @@ def demo(
         bus: `simulated`, or `rs232` (`rs232@38400`): the same robot behind the serial line of one of its drives.
     """
     from daemon import demo_turtle
-    from daemon.demo import FIGURES, Demo
+    from daemon.demo import FIGURES
     from daemon.runtime.clock import run_patient, run_virtual
     from profiles.loader import load
 
@@ -84,10 +85,16 @@ def demo(
         return run.drive(
             [partial(demo_turtle.drive, robot, entry, seed, out, say) for entry in turtle], _turtle_table, _draw_turtle
         )
-    with DemoView(every=100 if virtual_time else 10) as view:
+    return _max2d(figures, robot, bus, run, every=100 if virtual_time else 10)
+
+
+def _max2d(figures: tuple[Figure, ...], robot: Profile, bus: str, run: DemoRun, every: int) -> int:
+    from daemon.demo import Demo
+
+    with DemoView(every) as view:
 
         async def drive() -> list[FigureResult]:
-            return await Demo(robot, seed, out, view.tell, view.watch, bus).run(figures)
+            return await Demo(robot, run.seed, run.out, view.tell, view.watch, bus).run(figures)
 
         results: list[FigureResult] = run.runner(drive())
     run.show(results, _table, partial(_draw, robot))

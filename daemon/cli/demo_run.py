@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import importlib.util
 import signal
 from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-from canhelm.errors import UsageError
 from daemon.cli.output import say, show
+from daemon.cli.pictures import can_draw, make_folder
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -47,7 +46,7 @@ class DemoRun:
     def begin(self) -> None:
         """Make the folder; from now on signals end the demo in order. Raises UsageError: it cannot be made."""
         if self.out is not None:
-            _make_folder(self.out)
+            make_folder(self.out)
         _end_by_signals()
 
     def drive(
@@ -78,25 +77,6 @@ class DemoRun:
         if self.out is not None and can_draw():
             for result in results:
                 say(f"picture {draw(result, self.out)}")
-
-
-def can_draw() -> bool:
-    """Whether pictures can be drawn; says so where they cannot."""
-    if importlib.util.find_spec("matplotlib") is None:
-        say("no pictures: matplotlib is missing - pip install 'canhelm[plot]'")
-        return False
-    return True
-
-
-def _make_folder(out: Path) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UsageError(
-            f"--out {out} is no folder and cannot be made one: {error.strerror}",
-            value=str(out),
-            remedy="name a folder that this user may write to",
-        ) from error
 
 
 def _end_by_signals() -> None:
