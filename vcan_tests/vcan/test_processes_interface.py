@@ -7,13 +7,13 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
-from functools import partial
+from pathlib import Path
 
 import pytest
 
 from vcan_tests.kernel.slcan_adapter import SlcanAdapter
 from vcan_tests.vcan.bench import Bench, Daemon, Simulator, Status, bench, patient, write_profile
-from vcan_tests.vcan.pauses import watched_for_pauses
+from vcan_tests.vcan.pauses import PauseWatch, watched_for_pauses
 from vcan_tests.vcan.stethoscope import (
     DRIVES,
     LIFE_GUARDING,
@@ -22,7 +22,7 @@ from vcan_tests.vcan.stethoscope import (
     listen,
     stop_s,
 )
-from vcan_tests.vcan.witness import Frame, candump
+from vcan_tests.vcan.witness import Witness, candump
 
 pytestmark = [pytest.mark.vcan, pytest.mark.timeout(120)]
 
@@ -123,64 +123,59 @@ FAILURES = {
 
 
 @dataclass
-class FailedDrive:
-    """A robot that lost its controller while it drove.
+class AdapterBench:
+    """A robot that drives, by way of an adapter.
 
     Attributes:
-        daemon: its daemon, which saw it happen.
-        failure: what happened.
-        frames: what was on the drives' side of the failure from then on.
-        since_s: when it happened, wall-clock time.
-        stood_still_s: how long the whole machine stood still since then.
-        mend: does what mends it.
+        adapter: between daemon and drives.
+        daemon: of the robot.
+        wire: what is on the drives' side of the adapter.
+        pauses: of the machine; what it stands still is no delay of the drives.
     """
 
+    adapter: SlcanAdapter
     daemon: Daemon
-    failure: Failure
-    frames: list[Frame]
-    since_s: float
-    stood_still_s: float
-    mend: Callable[[], object]
+    wire: Witness
+    pauses: PauseWatch
+
+    def require_stop(self, since_s: float) -> None:
+        """Each drive has missed its master since then, said so, and stood in time."""
+        frames, paused_s = self.wire.frames(since_s), sum(self.pauses.between(since_s, since_s + LISTENED_S))
+        for node in DRIVES:
+            assert [code for code, _ in emergencies_after(frames, node, since_s)] == [LIFE_GUARDING]
+            assert at_rest_after(frames, node, since_s) < stop_s(SPEED_M_S, LIFE_TIME_S) + MARGIN_S + paused_s
 
 
-@pytest.fixture(scope="module", params=FAILURES)
-def failed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[FailedDrive]:
-    failure = FAILURES[request.param]
-    folder = tmp_path_factory.mktemp("failed")
+def begin_drive(folder: Path, stack: ExitStack) -> AdapterBench:
+    """Build a robot behind an adapter and let it drive, until the stack closes."""
     profile = write_profile(folder, GUARDED)
+    adapter = plug_in(stack)
+    wire = stack.enter_context(candump("vcan1", folder / "candump.log"))
+    pauses = stack.enter_context(watched_for_pauses(folder / "pauses"))
+    simulator = Simulator(profile, "socketcan:vcan1")
+    stack.callback(simulator.end)
+    daemon = Daemon(profile, "socketcan:can0")
+    stack.callback(daemon.end)
+    daemon.wait_for_state("idle")
+    Bench(profile, simulator, daemon, wire).drive(SPEED_M_S)
+    return AdapterBench(adapter, daemon, wire, pauses)
+
+
+@pytest.mark.parametrize("name", FAILURES)
+def test_drives_behind_a_failed_interface_stop_by_life_guarding_and_drive_again_once_the_named_cause_is_mended(
+    name: str, tmp_path: Path
+) -> None:
+    failure = FAILURES[name]
     with ExitStack() as stack:
-        adapter = plug_in(stack)
-        wire = stack.enter_context(candump("vcan1", folder / "candump.log"))
-        pauses = stack.enter_context(watched_for_pauses(folder / "pauses"))
-        simulator = Simulator(profile, "socketcan:vcan1")
-        stack.callback(simulator.end)
-        daemon = Daemon(profile, "socketcan:can0")
-        stack.callback(daemon.end)
-        daemon.wait_for_state("idle")
-        Bench(profile, simulator, daemon, wire).drive(SPEED_M_S)
+        drive = begin_drive(tmp_path, stack)
         since_s = time.time()
-        failure.strike(adapter)
+        failure.strike(drive.adapter)
         listen(LISTENED_S, "vcan1")
-        stood_still_s = sum(pauses.between(since_s, time.time()))
-        mend = partial(failure.mend, adapter, stack)
-        yield FailedDrive(daemon, failure, wire.frames(since_s), since_s, stood_still_s, mend)
-
-
-def test_the_drives_behind_a_failed_interface_stop_by_life_guarding(failed: FailedDrive) -> None:
-    within_s = stop_s(SPEED_M_S, LIFE_TIME_S) + MARGIN_S + failed.stood_still_s
-    for node in DRIVES:
-        assert [code for code, _ in emergencies_after(failed.frames, node, failed.since_s)] == [LIFE_GUARDING]
-        assert at_rest_after(failed.frames, node, failed.since_s) < within_s
-
-
-def test_the_status_names_the_cause_and_what_mends_it(failed: FailedDrive) -> None:
-    status = failed.daemon.status()
-    assert (status["state"], status["bus"]["down"]) == ("fault", failed.failure.cause)
-    assert failed.failure.remedy in status["bus"]["remedy"]
-
-
-def test_once_that_is_done_the_robot_boots_by_itself_and_drives_after_a_reset(failed: FailedDrive) -> None:
-    failed.mend()
-    failed.daemon.wait_for(lambda status: "down" not in status["bus"] and all_ready(status))
-    assert failed.daemon.canhelm("reset").returncode == 0
-    assert drives(failed.daemon)
+        drive.require_stop(since_s)
+        status = drive.daemon.status()
+        assert (status["state"], status["bus"]["down"]) == ("fault", failure.cause)
+        assert failure.remedy in status["bus"]["remedy"]
+        failure.mend(drive.adapter, stack)
+        drive.daemon.wait_for(lambda status: "down" not in status["bus"] and all_ready(status))
+        assert drive.daemon.canhelm("reset").returncode == 0
+        assert drives(drive.daemon)
