@@ -10,6 +10,7 @@ from daemon.runtime.own_vehicle import OwnKindVehicle
 from daemon.runtime.paired_steer_vehicle import PairedSteerVehicle
 from daemon.runtime.semitrailer_vehicle import SemitrailerVehicle
 from daemon.runtime.vehicle import BareDrives, Vehicle
+from drivers.contract import Brake, Drive, SteeringEncoder
 from drivers.devices import Devices
 from profiles.bricks import DifferentialGeometry
 from profiles.own_vehicle import OwnGeometry
@@ -29,12 +30,7 @@ def _vehicle_of(profile: Profile, devices: Devices) -> Vehicle:
     if geometry is None:
         return BareDrives(profile, tuple(devices.drives.values()))
     if isinstance(geometry, PairedSteerGeometry):
-        return PairedSteerVehicle(
-            profile,
-            tuple(devices.drives[name] for name in geometry.wheels),
-            tuple(devices.encoders[name] for name in geometry.encoders),
-            tuple(devices.brakes[name] for name in geometry.brakes),
-        )
+        return PairedSteerVehicle(profile, *_in_order(devices, geometry))
     if isinstance(geometry, OmniGeometry):
         return OmniVehicle(profile, tuple(devices.drives[name] for name in geometry.wheels), devices.accelerometer)
     if isinstance(geometry, CarGeometry):
@@ -49,10 +45,16 @@ def _vehicle_of(profile: Profile, devices: Devices) -> Vehicle:
         right, left = (devices.drives[name] for name in geometry.wheels)
         return DifferentialVehicle(profile, (right, left))
     if isinstance(geometry, OwnGeometry):
-        return OwnKindVehicle(
-            profile,
-            tuple(devices.drives[name] for name in geometry.wheels),
-            tuple(devices.encoders[name] for name in geometry.encoders),
-            tuple(devices.brakes[name] for name in geometry.brakes),
-        )
+        return OwnKindVehicle(profile, *_in_order(devices, geometry))
     raise ConfigError(f"profile {profile.name}: no loops for a vehicle of type {type(geometry).__name__}")
+
+
+def _in_order(
+    devices: Devices, geometry: PairedSteerGeometry | OwnGeometry
+) -> tuple[tuple[Drive, ...], tuple[SteeringEncoder, ...], tuple[Brake, ...]]:
+    """Drives, encoders and brakes in the order of the vehicle."""
+    return (
+        tuple(devices.drives[name] for name in geometry.wheels),
+        tuple(devices.encoders[name] for name in geometry.encoders),
+        tuple(devices.brakes[name] for name in geometry.brakes),
+    )
