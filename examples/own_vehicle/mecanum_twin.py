@@ -62,7 +62,3 @@ class MecanumWorld(BodyWorld):
     def heading_rad(self, pair: str) -> float:
         """Raises KeyError: no wheel steers."""
         raise KeyError(pair)
-
-    def set_brake(self, name: str, engaged: bool) -> None:
-        """Raises KeyError: there are no brakes."""
-        raise KeyError(name)
