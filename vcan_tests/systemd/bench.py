@@ -115,6 +115,7 @@ class Robot:
 
     def _set_up(self) -> None:
         if not self._as_installed():
+            self.switch_off()
             told("dpkg", "--install", str(PACKAGE))
         tell("systemctl", "stop", SERVICE, SOCKET_UNIT)
         tell("systemctl", "reset-failed")
