@@ -104,7 +104,9 @@ def _bus_wire(spec: str, profile: Profile, seed: int, built: Profile) -> Wire:
     if spec == "simulated":
         medium = SimulatedBus(bit_rate=profile.network.bit_rate, name="vcan0")
         network = SimulatedNetwork(built, medium, seed)
-        return Wire(medium.port("master"), profile, network, medium)
+        on_can = profile.drives or profile.encoders
+        bus: Bus = medium.port("master") if on_can else NoBus(profile.network.bit_rate)
+        return Wire(bus, profile, network, medium)
     serial = _RS232.fullmatch(spec)
     if serial is None:
         return _can_wire(open_bus(spec, profile.network.bit_rate), profile)

@@ -92,6 +92,7 @@ def findings(data: dict[str, Any], complete: bool = True) -> Iterator[Finding]:
     yield from _encoders(data)
     yield from _localisation(data)
     yield from _factory(data)
+    yield from _jerk(data)
     yield from _unused(data)
 
 
@@ -274,6 +275,13 @@ def _localisation(data: dict[str, Any]) -> Iterator[Finding]:
     if part(part(data, "simulation"), "scanner") and not part(data, "localisation"):
         what = "sees no reflectors: there is no localisation"
         yield Finding(("simulation", "scanner"), what, "write localisation: with reflectors")
+
+
+def _jerk(data: dict[str, Any]) -> Iterator[Finding]:
+    kind = part(data, "vehicle").get("type")
+    if part(data, "limits").get("jerk_m_s3") is not None and kind not in (None, "omni", "own"):
+        what = f"has no effect on a vehicle of type {kind}: only `drive to` of omni-wheels limits its jerk"
+        yield Finding(("limits", "jerk_m_s3"), what, "leave it out", warning=True)
 
 
 def _unused(data: dict[str, Any]) -> Iterator[Finding]:

@@ -27,7 +27,7 @@ def measure(duration_s: float, bus: str, profile: str) -> dict[str, Any]:
     """
     if not duration_s >= SHORTEST_S:
         raise UsageError(f"--bench {duration_s:g} is too short", limit=SHORTEST_S, remedy="give 30 seconds")
-    from daemon.board_bench import bench
+    from daemon.board_bench import RATES_HZ, bench
     from daemon.runtime.clock import run_precise
     from profiles.loader import load
 
@@ -35,6 +35,7 @@ def measure(duration_s: float, bus: str, profile: str) -> dict[str, Any]:
     simulated = bus == "simulated"
     if not simulated:
         _require_free(bus)
+    say(f"{duration_s:g} s in all for {len(RATES_HZ)} rates, and the boot-ups")
     runner: Callable[[Coroutine[Any, Any, dict[str, Any]]], dict[str, Any]]
     runner = run_precise if simulated else asyncio.run
     return runner(bench(robot, bus, duration_s, say))

@@ -52,7 +52,7 @@ def doctor(
         Write all that a report of a problem needs into this new ZIP file: versions, findings, status, profile, journal
         and the last run.
     bench: float
-        Measure for so many seconds which rate of control cycles this machine keeps, instead of looking for problems.
+        Measure for so many seconds in all which rate of control cycles this machine keeps; looks for no problems.
     bus: str
         Where to measure: a robot's bus, without a daemon; the default simulates one in this process.
     profile: str

@@ -100,9 +100,9 @@ def rotate(
     Parameters
     ----------
     rate_deg_s: float
-        Degrees a second, counter-clockwise positive.
+        A rate, not an angle: degrees a second, counter-clockwise positive. `drive to` turns by an angle.
     duration: float
-        Seconds.
+        Seconds; without it the turn has no end of its own.
     """
     return run_motion(options, "drive.rotate", no_wait=no_wait, rate_deg_s=rate_deg_s, duration_s=duration)
 

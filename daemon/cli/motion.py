@@ -35,6 +35,9 @@ def run_motion(options: Options, method: str, /, *, no_wait: bool = False, **par
         if no_wait:
             show(client.call(method, wait=False, **params), json=options.json)
             return 0
+        if params.get("duration_s", 0.0) is None and sys.stderr.isatty():
+            asked = ", ".join(f"{name} {words(value)}" for name, value in params.items() if value is not None)
+            say(f"{asked}: without --duration this goes on until Ctrl-C or `canhelm stop`")
         try:
             with signals_interrupt(), progress_line(client):
                 result = client.call(method, **params)

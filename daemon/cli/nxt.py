@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 
+from canhelm.errors import UsageError
 from daemon.cli.motion import run_motion
 from daemon.cli.options import DEFAULT, NoWait, Options
 from daemon.cli.output import show
@@ -22,9 +23,9 @@ class Driving:
     """How moves are driven."""
 
     power: float | None = None
-    """Of the faster wheel, 1 to 100; 100 is 1000 degrees a second. Without it the profile's speed limit says."""
+    """Open loop: of the faster wheel, 1 to 100; 100 is 1000 degrees a second. Without it the profile's limit says."""
     compensate: Annotated[bool, Parameter(negative=())] = False
-    """Take what a wheel turned too far off its next move; the brick does that itself, so it is off."""
+    """Open loop: take what a wheel turned too far off its next move; the brick does that itself, so it is off."""
     tolerance: float | None = None
     """Under feedback: metres in x and y that count as there (0.002)."""
     tolerance_deg: float | None = None
@@ -36,8 +37,14 @@ class Driving:
     speed: float | None = None
     """Under feedback: m/s, no faster than this."""
 
-    def params(self) -> dict[str, Any]:
-        """As the API calls them."""
+    def params(self, feedback: bool) -> dict[str, Any]:
+        """As the API calls them. Raises UsageError where an option has no effect on moves driven like that."""
+        for option in OPEN_LOOP_ALONE if feedback else FEEDBACK_ALONE:
+            if getattr(self, option) != getattr(STEADY, option):
+                how = "under feedback" if feedback else "open loop"
+                name = option.replace("_", "-")
+                remedy = "leave it out, or drive " + ("open loop" if feedback else "with feedback")
+                raise UsageError(f"--{name} has no effect {how}", remedy=remedy)
         given = asdict(self)
         for name, unit in (("tolerance", "m"), ("timeout", "s"), ("speed", "m_s")):
             given[f"{name}_{unit}"] = given.pop(name)
@@ -45,6 +52,8 @@ class Driving:
 
 
 STEADY = Driving()
+OPEN_LOOP_ALONE = ("power", "compensate")
+FEEDBACK_ALONE = ("tolerance", "tolerance_deg", "timeout", "gains", "speed")
 Feedback = Annotated[
     bool, Parameter(negative=(), help="Seek the end of each move by odometry, instead of by the brick's tacho limits.")
 ]
@@ -69,7 +78,7 @@ def line(
     distance: float
         Metres; negative drives backward.
     """
-    params = {"distance_m": distance, "feedback": feedback, **driving.params()}
+    params = {"distance_m": distance, "feedback": feedback, **driving.params(feedback)}
     return run_motion(options, "nxt.line", no_wait=no_wait, **params)
 
 
@@ -102,7 +111,8 @@ def bend(
         Backward along the circle.
     """
     params = {"radius_m": radius, "angle_deg": angle, "side": "right" if right else "left", "backward": backward}
-    return run_motion(options, "nxt.bend", no_wait=no_wait, **params, feedback=feedback, **driving.params())
+    driven = {"feedback": feedback, **driving.params(feedback)}
+    return run_motion(options, "nxt.bend", no_wait=no_wait, **params, **driven)
 
 
 @app.command
@@ -132,7 +142,8 @@ def goto(
     open_loop: bool
         By tacho limits, as a turn, a line and a turn, instead of by feedback.
     """
-    params = {"x_m": x, "y_m": y, "heading_deg": heading_deg, "feedback": not open_loop, **driving.params()}
+    driven = {"feedback": not open_loop, **driving.params(feedback=not open_loop)}
+    params = {"x_m": x, "y_m": y, "heading_deg": heading_deg, **driven}
     return run_motion(options, "nxt.goto", no_wait=no_wait, **params)
 
 
@@ -153,7 +164,7 @@ def moves(
     move: str
         `line METRES`, or `bend METRES DEGREES` with `right` and `back`.
     """
-    params = {"moves": list(move), "feedback": feedback, **driving.params()}
+    params = {"moves": list(move), "feedback": feedback, **driving.params(feedback)}
     return run_motion(options, "nxt.moves", no_wait=no_wait, **params)
 
 

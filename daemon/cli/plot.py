@@ -15,7 +15,7 @@ from daemon.runs.store import LAST
 def plot(
     name: str = LAST, /, *, out: Path | None = None, folder: Folder = None, robot: Robot = None, json: Json = None
 ) -> None:
-    """Draw a run: track, headings, speeds commanded and measured, currents, active limits, slip; say what stands out.
+    """Draw a run: track, headings, speeds, currents (what the robot has of it), limits, slip; say what stands out.
 
     Example: `canhelm plot last`
 

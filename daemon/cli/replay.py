@@ -35,7 +35,9 @@ def replay(file: Path, /, *, profile: str = "max2d", every: float = 0.1, json: J
     robot = load(profile).profile
     if robot.bricks:
         raise UsageError(
-            f"robot {robot.name} has a brick beside CAN", value=profile, remedy="a log of CAN has no brick"
+            f"robot {robot.name} has a brick, of which a log of CAN says nothing",
+            value=profile,
+            remedy="name the robot whose log it is, by --profile; `canhelm plot` draws a run of this one",
         )
     replayed = run_virtual(decode(robot, _frames(file), every))
     say(f"{replayed.frames} frames, of which the daemon reads {replayed.read}; {replayed.malformed} malformed")
@@ -56,7 +58,8 @@ def _frames(file: Path) -> Iterator[LogFrame]:
                 found += 1
                 yield frame
     except OSError as error:
-        raise UsageError(f"cannot read {file}: {error.strerror}", remedy="name a candump log") from error
+        remedy = "name a candump log; a robot without CAN leaves none"
+        raise UsageError(f"cannot read {file}: {error.strerror}", remedy=remedy) from error
     if not found:
         raise ConfigError(f"{file} has no frame of candump's log format", remedy="make it by `candump -L`")
     if others:

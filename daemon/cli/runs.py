@@ -34,7 +34,9 @@ def list_(*, folder: Folder = None, robot: Robot = None, json: Json = None) -> N
     """
     found = find_runs(folder, robot)
     if not found:
-        say("there are no runs yet: each motion of `canhelm run` leaves one")
+        looked = ", ".join(map(str, store.searched(_folder(folder), os.environ)))
+        whose = f" of {robot}" if robot else ""
+        say(f"no runs{whose} in {looked}: each motion of `canhelm run` leaves one; --runs DIR looks elsewhere")
     show([summary(run) for run in found], _table, json)
 
 
@@ -61,7 +63,7 @@ def delete(*names: str, folder: Folder = None, robot: Robot = None) -> None:
     Example: `canhelm runs delete 3 4`
 
     Args:
-        names: Numbers of runs, last, or all.
+        names: Numbers of runs, last, or all. last is the newest of all robots, or of that of --robot.
     """
     found = find_runs(folder, robot)
     if not names:
@@ -74,8 +76,11 @@ def delete(*names: str, folder: Folder = None, robot: Robot = None) -> None:
 
 def find_runs(folder: str | None, robot: str | None) -> list[Run]:
     """The runs among which a person chooses, oldest first. Raises UsageError or ConfigError."""
-    given = None if folder in (None, OFF) else Path(folder or "")
-    return store.read_runs(store.all_folders(given, os.environ), robot)
+    return store.read_runs(store.all_folders(_folder(folder), os.environ), robot)
+
+
+def _folder(given: str | None) -> Path | None:
+    return None if given in (None, OFF) else Path(given or "")
 
 
 def summary(run: Run) -> dict[str, Any]:

@@ -1,10 +1,13 @@
-"""The picture of a run: track, headings, speeds, currents, how the wheels keep to their speeds, and limits."""
+"""The picture of a run: track, headings, speeds, how the wheels keep to them, currents, and limits."""
 
 from __future__ import annotations
 
+import itertools
 import json
+import math
 import textwrap
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +22,7 @@ from matplotlib import pyplot as plt
 
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
 """Okabe and Ito's palette, which colour-blind people can tell apart."""
+COLUMNS = 2
 SLIP = "slip along {}"
 
 
@@ -39,19 +43,44 @@ def draw(run: Run, path: Path) -> list[str]:
     """
     table = read_table(run)
     signs = read_signs(table, read_yaml(run.folder / PROFILE))
-    figure, axes = plt.subplots(3, 2, figsize=(14, 12), layout="constrained")
+    shown = list(panels(run, table))
+    rows = math.ceil(len(shown) / COLUMNS)
+    figure, grid = plt.subplots(rows, COLUMNS, figsize=(14, 4 * rows), layout="constrained", squeeze=False)
     figure.suptitle(_title(run, signs))
-    _track(axes[0][0], table)
-    _lines(axes[0][1], table, table.of("heading_deg"), "steering headings, by their encoders", "heading [°]")
-    _speeds(axes[1][0], table)
-    _lines(axes[1][1], table, _deviations(table), "measured minus commanded speed", "rim speed [m/s]")
-    _lines(axes[2][0], table, table.of("current_a"), "motor currents (positive: pushes forward)", "current [A]")
-    _active(axes[2][1], table, {**table.limits(), **_slips(run)})
+    for axes, panel in itertools.zip_longest(grid.flat, shown, fillvalue=_nothing):
+        panel(axes)
     try:
         figure.savefig(path, dpi=90)
     finally:
         plt.close(figure)
     return signs
+
+
+def panels(run: Run, table: Table) -> Iterator[partial[None]]:
+    """What the robot has, in the order of the picture; a quantity that nothing has told is left out."""
+    yield partial(_track, table=table)
+    headings, currents = _told(table.of("heading_deg")), _told(table.of("current_a"))
+    measured = any(map(any, currents.values()))
+    if headings:
+        yield partial(
+            _lines, table=table, columns=headings, title="steering headings, by their encoders", label="heading [°]"
+        )
+    if _told(table.of("speed_m_s")):
+        yield partial(_speeds, table=table)
+        deviations, title = _deviations(table), "measured minus commanded speed"
+        yield partial(_lines, table=table, columns=deviations, title=title, label="rim speed [m/s]")
+    if measured:
+        title = "motor currents (positive: pushes forward)"
+        yield partial(_lines, table=table, columns=currents, title=title, label="current [A]")
+    yield partial(_active, table=table, times={**table.limits(), **_slips(run)})
+
+
+def _told(columns: Mapping[str, list[float]]) -> dict[str, list[float]]:
+    return {name: column for name, column in columns.items() if not all(map(math.isnan, column))}
+
+
+def _nothing(axes: Any) -> None:
+    axes.axis("off")
 
 
 def _title(run: Run, signs: list[str]) -> str:

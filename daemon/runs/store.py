@@ -129,6 +129,11 @@ def _person_folder(environment: Mapping[str, str]) -> Path:
     return Path(state) / "canhelm"
 
 
+def searched(given: Path | None, environment: Mapping[str, str]) -> list[Path]:
+    """Where :func:`all_folders` looks: the folder given, else for a folder a robot in each of these."""
+    return [given] if given is not None else [SYSTEM_FOLDER, _person_folder(environment)]
+
+
 def all_folders(given: Path | None, environment: Mapping[str, str]) -> list[Path]:
     """The folders in which to look for runs.
 
@@ -146,7 +151,7 @@ def all_folders(given: Path | None, environment: Mapping[str, str]) -> list[Path
         return [given]
     found: list[Path] = []
     closed = ""
-    for root in (SYSTEM_FOLDER, _person_folder(environment)):
+    for root in searched(None, environment):
         try:
             found += [robot / RUNS for robot in sorted(root.iterdir()) if (robot / RUNS).is_dir()]
         except FileNotFoundError:
@@ -170,8 +175,8 @@ def read_runs(folders: Iterable[Path], robot: str | None = None) -> list[Run]:
 def choose(runs: list[Run], name: str) -> Run:
     """The run that a person means by a number or ``last``. Raises UsageError."""
     if not runs:
-        remedy = "each motion of `canhelm run` leaves one; --runs DIR looks elsewhere"
-        raise UsageError("there are no runs yet", remedy=remedy)
+        remedy = "each motion of `canhelm run` leaves one; `canhelm runs` says where they are looked for"
+        raise UsageError("there are no runs", remedy=remedy)
     if name == LAST:
         return runs[-1]
     if not (name.isascii() and name.isdecimal()):

@@ -26,10 +26,12 @@ class BrickCommands:
         """The brick that is meant. Raises Refused where there is none, NodeAbsent where there is no such one."""
         if not self._bricks:
             raise Refused("this robot has no NXT brick", remedy="add `bricks:` to its profile")
-        name = params.get("brick") or next(iter(self._bricks))
-        if name not in self._bricks or (len(self._bricks) > 1 and not params.get("brick")):
-            have = ", ".join(self._bricks)
-            raise NodeAbsent(f"which brick? {name!r} is not the only one", remedy=f"give one of {have}")
+        given, have = params.get("brick"), ", ".join(self._bricks)
+        if not given and len(self._bricks) > 1:
+            raise NodeAbsent("which brick? this robot has several", remedy=f"give one of {have}")
+        name = given or next(iter(self._bricks))
+        if name not in self._bricks:
+            raise NodeAbsent(f"this robot has no brick {name!r}", remedy=f"give one of {have}, or none")
         return name, self._bricks[name]
 
     async def _battery(self, params: Params, lease: str | None) -> dict[str, Any]:

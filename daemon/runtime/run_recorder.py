@@ -248,6 +248,8 @@ class RunRecorder:
         if recording.folder is None:
             return
         for name, data in pending.items():
+            if not data:
+                continue
             with (recording.folder / name).open("ab") as file:
                 file.write(data)
 

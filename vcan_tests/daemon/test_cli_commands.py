@@ -204,6 +204,16 @@ def test_a_command_that_is_handed_over_prints_the_id(server: Server, capsys: pyt
     assert json.loads(capsys.readouterr().out) == {"motion": "1"}
 
 
+def test_a_motion_without_an_end_says_so_on_a_terminal(
+    server: Server, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    assert main(["drive", "rotate", "90"]) == 0
+    assert "rate_deg_s 90: without --duration this goes on until Ctrl-C or" in capsys.readouterr().err
+    assert main(["drive", "rotate", "90", "--duration", "1"]) == 0
+    assert "without --duration" not in capsys.readouterr().err
+
+
 def test_follow_streams_json_lines_and_ends_quietly_with_its_reader(server: Server) -> None:
     with canhelm("status --follow --rate 50") as process:
         assert process.stdout is not None

@@ -64,6 +64,24 @@ def test_a_command_sends_its_method(
     assert params.items() <= given.items()
 
 
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["line", "1", "--tolerance", "0.01"], "--tolerance has no effect open loop"),
+        (["goto", "1", "0", "--open-loop", "--timeout", "5"], "--timeout has no effect open loop"),
+        (["moves", "line 1", "--gains", "report"], "--gains has no effect open loop"),
+        (["bend", "0.2", "90", "--feedback", "--compensate"], "--compensate has no effect under feedback"),
+        (["goto", "1", "0", "--power", "30"], "--power has no effect under feedback"),
+    ],
+)
+def test_an_option_without_effect_is_wrong_usage(
+    backend: FakeBackend, capsys: pytest.CaptureFixture[str], words: list[str], told: str
+) -> None:
+    assert main(["nxt", *words]) == 2
+    assert told in capsys.readouterr().err
+    assert not backend.calls
+
+
 # Ways to a brick
 
 

@@ -165,7 +165,7 @@ async def test_the_battery_and_the_brick_are_told() -> None:
 
 async def test_another_brick_is_unknown() -> None:
     async with running_robot(NXT, seed=3) as robot:
-        with pytest.raises(CanhelmError, match="which brick"):
+        with pytest.raises(CanhelmError, match="no brick 'other'"):
             await robot.call("nxt.info", brick="other")
 
 

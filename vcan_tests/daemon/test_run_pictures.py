@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from daemon.cli.main import main
+from daemon.runs.pictures import panels
 from daemon.runs.signs import read_signs, side_by_side
 from daemon.runs.store import PROFILE, TERMS, Run, RunStore, read_runs, read_yaml
 from daemon.runs.table import read_table
@@ -82,6 +83,19 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return driven(folder, wrong_wheel(folder, 0.105)).folder.parent
 
 
+def test_a_picture_has_no_empty_panels(tmp_path: Path) -> None:
+    async def drive() -> None:
+        async with running_robot(load("nxt").profile, runs=RunStore(tmp_path)) as robot:
+            await robot.call("nxt.line", distance_m=0.2)
+
+    run_virtual(drive())
+    run = read_runs([tmp_path])[-1]
+    titles = [panel.keywords.get("title") for panel in panels(run, read_table(run))]
+    assert "steering headings, by their encoders" not in titles
+    assert "motor currents (positive: pushes forward)" not in titles
+    assert len(titles) == 4
+
+
 def test_plot_last_draws_the_run_and_says_what_stands_out(
     runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -108,6 +122,13 @@ def test_runs_show_tells_where_the_files_are(runs: Path, capsys: pytest.CaptureF
 def test_runs_of_another_robot_are_left_out(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["runs", "--runs", str(runs), "--robot", "turtle", "--json"]) == 0
     assert capsys.readouterr().out == ""
+
+
+def test_no_runs_are_told_with_the_folder_that_was_looked_into(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["runs", "--runs", str(tmp_path), "--robot", "turtle"]) == 0
+    assert f"no runs of turtle in {tmp_path}:" in capsys.readouterr().err
 
 
 def test_a_deleted_run_is_gone(tmp_path: Path) -> None:
@@ -138,7 +159,7 @@ def test_nonsense_is_refused_with_words(
 
 def test_a_folder_without_runs_is_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plot", "--runs", str(tmp_path)]) == 2
-    assert "there are no runs yet" in capsys.readouterr().err
+    assert "there are no runs" in capsys.readouterr().err
 
 
 def test_a_run_without_rows_is_said_to_be_damaged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

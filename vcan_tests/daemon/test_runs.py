@@ -191,6 +191,13 @@ async def test_a_move_that_a_brick_carries_out_itself_leaves_its_progress(tmp_pa
     assert max(step["terms"]["x_m"] for step in steps) == pytest.approx(0.2, abs=0.05)
 
 
+async def test_a_robot_without_can_leaves_no_log_of_frames(tmp_path: Path) -> None:
+    async with running_robot(load("nxt").profile, runs=RunStore(tmp_path)) as robot:
+        await robot.call("nxt.line", distance_m=0.1)
+    assert (tmp_path / "0001" / CYCLES).exists()
+    assert not (tmp_path / "0001" / FRAMES).exists()
+
+
 def test_a_service_keeps_its_runs_with_its_state() -> None:
     assert own_folder("lab1", {"STATE_DIRECTORY": "/var/lib/canhelm/lab1"}) == Path("/var/lib/canhelm/lab1/runs")
 

@@ -18,6 +18,10 @@ def test_a_baud_rate_that_is_none_is_named(spec: str) -> None:
     assert "115200" in (refused.value.remedy or "")
 
 
+async def test_a_simulated_robot_of_a_brick_alone_has_no_can() -> None:
+    assert make_wire("simulated", load("nxt").profile, 0).bus.name == "none"
+
+
 @pytest.mark.parametrize("spec", ["rs232:", "rs232:@115200"])
 def test_a_device_that_is_left_out_is_told_with_both_meanings(spec: str) -> None:
     with pytest.raises(UsageError, match="names no serial device") as refused:

@@ -72,6 +72,16 @@ def test_a_weak_output_for_a_brake_is_a_warning(robot: Robot) -> None:
     assert "carries 100 mA only" in robot("brakes: {rear: {output: 3, output_bit: 13}}").warnings[0]
 
 
+def test_a_limited_jerk_where_nothing_limits_it_is_a_warning(robot: Robot) -> None:
+    (warning,) = robot("limits: {jerk_m_s3: 5}").warnings
+    assert "lab.yaml:4: limits.jerk_m_s3: has no effect on a vehicle of type paired_steer" in warning
+
+
+def test_omni_wheels_may_have_a_limited_jerk(tmp_path: Path) -> None:
+    (tmp_path / "lab.yaml").write_text("schema_version: 1\nextends: turtle\nlimits: {jerk_m_s3: 5}\n")
+    assert not [warning for warning in load(tmp_path / "lab.yaml").warnings if "jerk" in warning]
+
+
 def test_a_clash_with_an_inherited_value_is_blamed_on_the_own_file(mistakes: Mistakes) -> None:
     shipped = (SHIPPED / "robots/max2d.yaml").read_text().splitlines()
     line = next(number for number, text in enumerate(shipped, 1) if "node: !assumed 5" in text)
