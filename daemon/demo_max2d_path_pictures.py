@@ -26,7 +26,7 @@ def draw(result: PathResult, folder: Path) -> Path:
     numbers = result.numbers
     planned_mm, true_mm = 1e3 * numbers["deviation_m"], 1e3 * numbers["true_deviation_m"]
     figure.suptitle(
-        f"The MAX2D follows a path in {len(result.pieces)} pieces: planned within {planned_mm:.0f} mm, "
+        f"The MAX2D follows a path in {len(result.pieces)} pieces: planned within {planned_mm:.0f} mm,\n"
         f"driven by odometry alone within {true_mm:.0f} mm (simulation)"
     )
     _map(map_axes, result)

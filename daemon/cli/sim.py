@@ -30,7 +30,7 @@ def power(node: NodeOrAll, state: Literal["on", "off"], /, *, options: Options =
 def turn(node: Node, angle: float | None = None, /, *, options: Options = DEFAULT) -> None:
     """Hold the axis of a simulated encoder by hand at an angle, as for a calibration; without an angle, let go of it.
 
-    Example: `canhelm sim turn steering 12.5`
+    Example: `canhelm sim turn steering_angle 12.5`
     """
     wanted = node_of(node)
     with options.client() as client:

@@ -6,10 +6,14 @@ import json
 from pathlib import Path
 
 import pytest
+from matplotlib import pyplot
+from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from canhelm.errors import UsageError
 from daemon.cli.main import main
 from daemon.demo_max2d_path import PathResult, drive
+from daemon.demo_max2d_path_pictures import draw
 from daemon.runtime.clock import run_virtual
 from profiles.loader import load
 
@@ -44,6 +48,18 @@ def test_the_command_prints_the_pieces_and_draws(tmp_path: Path, capsys: pytest.
     row = json.loads(capsys.readouterr().out)
     assert row["stops"] == len(row["pieces"]) - 1
     assert (tmp_path / "figure-path-in-pieces.png").stat().st_size > 10_000
+
+
+def test_the_title_of_the_picture_is_not_cut(
+    result: PathResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[Figure] = []
+    monkeypatch.setattr(pyplot, "close", drawn.append)
+    draw(result, tmp_path)
+    monkeypatch.undo()
+    (title,) = [text for text in drawn[0].findobj(Text) if text.get_text().startswith("The MAX2D follows")]
+    assert title.get_window_extent().width < drawn[0].bbox.width
+    pyplot.close(drawn[0])
 
 
 def test_another_vehicle_is_refused() -> None:
