@@ -8,7 +8,7 @@ OUT ?= demo-out
 SERVICE_PYTHON ?= /usr/bin/python3
 PREFIX ?= /opt/canhelm
 PACKAGED = $(shell find canhelm daemon drivers profiles packaging systemd -type f ! -name '*.py[co]') \
-	docs/service.md pyproject.toml README.md CHANGELOG.md LICENSE
+	$(wildcard docs/*.md) pyproject.toml README.md CHANGELOG.md LICENSE
 PACKAGING = DESTDIR='$(DESTDIR)' PREFIX='$(PREFIX)' PYTHON='$(SERVICE_PYTHON)' PIP_PYTHON='$(VENV)/bin/python'
 
 .DEFAULT_GOAL := help

@@ -1,5 +1,6 @@
 #!/bin/sh
-# Installs canhelm as a service: packaging/install.sh [files], called by `make install`; "files" leaves the program out.
+# Installs canhelm as a service: packaging/install.sh [files|help], called by `make install`; "files" leaves out the program
+# and what it makes itself, "help" is that alone: pages for man, completions of shells, reference pages.
 # DESTDIR is where a package is put together, empty for this machine; PREFIX is where the program will live.
 set -eu
 cd "$(dirname "$0")/.."
@@ -26,6 +27,18 @@ install_program() { # an environment of its own, without pip, as if it had been 
 	ln -sfn "$prefix/bin/canhelm" "$root/usr/bin/canhelm"
 }
 
+install_help() { # made by the installed program from its own tables
+	completions=$(mktemp -d)
+	"$root$prefix/bin/python3" -P -m daemon.reference \
+		man "$root/usr/share/man/man1" pages "$doc/reference" completions "$completions"
+	put "$completions/canhelm" "$root/usr/share/bash-completion/completions/canhelm"
+	put "$completions/_canhelm" "$root/usr/share/zsh/vendor-completions/_canhelm"
+	put "$completions/canhelm.fish" "$root/usr/share/fish/vendor_completions.d/canhelm.fish"
+	rm -r "$completions"
+	gzip -9nf "$root"/usr/share/man/man1/canhelm*.1
+	chmod 644 "$root"/usr/share/man/man1/canhelm*.1.gz "$doc"/reference/*
+}
+
 install_files() {
 	for unit in canhelm@.service canhelm@.socket can@.service; do put "systemd/$unit" "$lib/systemd/system/$unit"; done
 	put systemd/canhelm.sysusers "$lib/sysusers.d/canhelm.conf"
@@ -36,7 +49,7 @@ install_files() {
 	[ -e "$root/etc/canhelm/canhelm.env" ] || put systemd/canhelm.env "$root/etc/canhelm/canhelm.env"
 	mkdir -p "$root/etc/canhelm/robots"
 	for example in systemd/examples/*; do put "$example" "$doc/examples/${example##*/}"; done
-	put docs/service.md "$doc/service.md"
+	for page in docs/*.md; do put "$page" "$doc/${page##*/}"; done
 }
 
 make_known() { # to the running system: users, folders, units, rules
@@ -48,13 +61,19 @@ make_known() { # to the running system: users, folders, units, rules
 	command -v udevadm >/dev/null && udevadm control --reload || true
 }
 
-install_files
-[ "${1:-all}" = files ] && exit
+case "${1:-all}" in
+files | help)
+	"install_$1"
+	exit
+	;;
+esac
 case "$("$PYTHON" -c 'import sys; print(sys.base_prefix.split("/")[1])')" in
 home | root) # what ProtectHome= hides
 	echo "$PYTHON lives in a home folder, which the service may not see: make SERVICE_PYTHON=/usr/bin/python3 install" >&2
 	exit 1
 	;;
 esac
+install_files
 install_program
+install_help
 if [ -z "$root" ]; then make_known; fi

@@ -1,4 +1,4 @@
-"""``python -m daemon.reference pages|man|completions DIR``: what ``make docs`` and the packages need of these pages."""
+"""``python -m daemon.reference KIND DIR [KIND DIR ...]``: what ``make docs`` and the packages need of these pages."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ KINDS = {"pages": site_pages, "man": man_pages, "completions": completions}
 
 
 def main(argv: list[str]) -> int:
-    """Write one kind of files into a folder; the exit code."""
-    if len(argv) != 2 or argv[0] not in KINDS:
-        print(f"usage: python -m daemon.reference {'|'.join(KINDS)} DIR", file=sys.stderr)
+    """Write each kind of files into its folder; the exit code."""
+    wanted = list(zip(argv[::2], argv[1::2], strict=False))
+    if not argv or len(argv) % 2 or any(kind not in KINDS for kind, _ in wanted):
+        print(f"usage: python -m daemon.reference {'|'.join(KINDS)} DIR ...", file=sys.stderr)
         return 2
-    write(KINDS[argv[0]](), Path(argv[1]))
+    for kind, folder in wanted:
+        write(KINDS[kind](), Path(folder))
     return 0
 
 
 if __name__ == "__main__":
-    sys.argv[0] = "canhelm"  # else the parser writes "-m daemon.reference" into the usage of commands
     sys.exit(main(sys.argv[1:]))

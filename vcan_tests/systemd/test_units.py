@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gzip
 import os
 import re
+import shutil
 import stat
 import subprocess
 import sys
@@ -77,6 +79,46 @@ def test_all_that_the_service_needs_is_installed(installed: Path) -> None:
 def test_what_is_installed_is_readable_for_everybody(installed: Path) -> None:
     modes = {stat.S_IMODE((installed / name).stat().st_mode) for name in _files(installed)}
     assert modes == {0o644}
+
+
+@pytest.fixture(scope="module")
+def helpful(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Pages and completions, made by a program in its place there."""
+    folder = tmp_path_factory.mktemp("root")
+    program = folder / "opt/canhelm/bin/python3"
+    program.parent.mkdir(parents=True)
+    program.write_text(f'#!/bin/sh\nexec {sys.executable} "$@"\n')
+    program.chmod(0o755)
+    _run(INSTALL, folder, "help")
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("path", "text"),
+    [
+        ("man/man1/canhelm.1.gz", ".SH SEE ALSO"),
+        ("man/man1/canhelm-make-safe.1.gz", "canhelm make\\-safe"),
+        ("bash-completion/completions/canhelm", "complete -F"),
+        ("zsh/vendor-completions/_canhelm", "#compdef canhelm"),
+        ("fish/vendor_completions.d/canhelm.fish", "complete -c canhelm"),
+        ("doc/canhelm/reference/commands.md", "### canhelm make-safe"),
+    ],
+)
+def test_pages_and_completions_are_where_shells_and_man_look(helpful: Path, path: str, text: str) -> None:
+    content = (helpful / "usr/share" / path).read_bytes()
+    told = gzip.decompress(content) if path.endswith(".gz") else content
+    assert text in told.decode()
+
+
+def test_pages_and_completions_are_readable_for_everybody(helpful: Path) -> None:
+    modes = {stat.S_IMODE(path.stat().st_mode) for path in (helpful / "usr").rglob("*") if path.is_file()}
+    assert modes == {0o644}
+
+
+def test_uninstalling_takes_pages_and_completions_away(helpful: Path, tmp_path: Path) -> None:
+    copy = Path(shutil.copytree(helpful, tmp_path / "copy"))
+    _run(UNINSTALL, copy)
+    assert _files(copy) == set()
 
 
 def test_another_prefix_is_in_every_file(tmp_path: Path) -> None:
