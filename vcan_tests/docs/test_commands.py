@@ -29,7 +29,7 @@ def console_blocks(page: str) -> list[Block]:
 
 
 PLAYED = ("docs/first-week.md",)
-"""Pages whose commands make one story, with a test of its own: `vcan_tests/daemon/test_first_week.py`."""
+"""Pages whose commands make one story, with a test of its own: `vcan_tests/docs/test_first_week.py`."""
 PAGES = [page for page in pages() if page not in PLAYED and any(block.commands() for block in console_blocks(page))]
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from profiles.loader import load
 from profiles.schema import Profile
-from vcan_tests.daemon.typed import Typist, fits, played
+from vcan_tests.docs.typed import Typist, fits, played
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "first-week.md"
 pytestmark = pytest.mark.timeout(600)
@@ -52,7 +52,7 @@ def week(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Week]:
 
 
 def test_the_page_shows_what_its_commands_say(week: Week) -> None:
-    anew = "`python -m vcan_tests.daemon.typed docs/first-week.md` writes down what they say now"
+    anew = "`python -m vcan_tests.docs.typed docs/first-week.md` writes down what they say now"
     assert week.told.splitlines() == PAGE.read_text(encoding="utf-8").splitlines(), anew
 
 
