@@ -150,6 +150,11 @@ class Daemon:
         """Wait until the vehicle is in that state; why it is."""
         return str(self.wait_for(lambda status: status["state"] == state)["message"])
 
+    def leave_fault(self) -> None:
+        """Reset a robot that a pause of the machine has stopped in an earlier try."""
+        if self.status()["state"] == "fault":
+            assert self.canhelm("reset").returncode == 0
+
     def signal(self, number: signal.Signals) -> float:
         """Send a signal; the wall-clock time at which."""
         now_s = time.time()

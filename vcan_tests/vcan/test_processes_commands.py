@@ -91,6 +91,7 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
 def test_a_command_ends_with_its_exit_code_and_has_been_on_the_wire(
     robot: Bench, typed: str, code: int, frame: str
 ) -> None:
+    robot.daemon.leave_fault()
     before = len(robot.wire.text())
     done = robot.daemon.canhelm(*typed.format(folder=robot.profile.parent).split())
     assert done.returncode == code, done.stderr

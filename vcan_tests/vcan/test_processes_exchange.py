@@ -21,14 +21,14 @@ OPERATIONAL = 5
 @pytest.fixture(scope="module")
 def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     folder = tmp_path_factory.mktemp("exchange")
-    with bench(folder, patient(cycle_hz=50), options=("--record", str(folder / "recorded.log"))) as made:
+    with bench(folder, patient(cycle_hz=25), options=("--record", str(folder / "recorded.log"))) as made:
         yield made
 
 
 @pytest.fixture(scope="module")
 def frames(robot: Bench) -> list[Frame]:
     """What was on the wire until some seconds after the robot was ready."""
-    robot.daemon.wait_for(lambda status: status["cycle"]["cycles"] > 300)
+    robot.daemon.wait_for(lambda status: status["cycle"]["cycles"] > 150)
     return robot.wire.frames()
 
 
