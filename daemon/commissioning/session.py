@@ -73,10 +73,11 @@ async def commission(daemon: Daemon, person: Person, profile: Profile, what: str
         raise GivenUp("nothing was changed", remedy="lift the robot first")
     try:
         await daemon.call("brake.engage", pair=ALL)
-        if not await _holding_brakes_work(daemon, person, profile, chosen, findings):
-            return findings
         axle = chosen_axle(profile, what)
-        async with capped(daemon, person, [*chosen, axle.drive] if axle else chosen, current_ma):
+        drives = [*chosen, axle.drive] if axle else chosen
+        if not await _holding_brakes_work(daemon, person, profile, drives, findings):
+            return findings
+        async with capped(daemon, person, drives, current_ma):
             await look_at_wheels(daemon, person, chosen, wheels_of(profile), _holding(profile), findings)
             pushes = await _steer(daemon, person, profile, axle, findings) if axle else []
         if what in (ALL, PAIRS):
@@ -113,7 +114,7 @@ async def _holding_brakes_work(
 async def _steer(daemon: Daemon, person: Person, profile: Profile, axle: SteeredAxle, findings: Findings) -> list[Push]:
     """What the encoders tell of the steered axle, where it turns."""
     config = profile.drives[axle.drive]
-    look = partial(look_at_axle, daemon, person, axle, config)
+    look = partial(look_at_axle, daemon, person, axle, config, _holding(profile)[axle.drive])
     seen = await tried(daemon, person, axle.drive, findings, look)
     push = judge_axle(seen, axle, config, findings) if seen else None
     return [push] if push else []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from daemon.commissioning.dialogue import Daemon, Person
@@ -41,18 +41,24 @@ def steered_axle(profile: Profile) -> SteeredAxle | None:
     return axle
 
 
-async def look_at_axle(daemon: Daemon, person: Person, axle: SteeredAxle, config: DriveConfig) -> Steered:
-    """Steer to the left, ask what is seen, and steer back. Raises CanhelmError, EOFError."""
+async def look_at_axle(
+    daemon: Daemon, person: Person, axle: SteeredAxle, config: DriveConfig, brakes: Sequence[str] = ()
+) -> Steered:
+    """Steer to the left, ask what is seen, and steer back. Raises CanhelmError, EOFError.
+
+    Args:
+        brakes: holding brakes of its drive.
+    """
     speed = math.radians(STEER_DEG) * config.wheel_radius_m / JOG_S
     await person.ask(
         f"{axle.drive} (node {config.node}) steers for {JOG_S:g} s as if to the left; press Enter and watch"
     )
     before = await headings_deg(daemon)
-    way_m = await jog(daemon, axle.drive, config, speed)
+    way_m = await jog(daemon, axle.drive, config, speed, brakes)
     after = await headings_deg(daemon)
     while (side := (await person.ask(QUESTION)).lower()) not in SIDES:
         person.tell("say left, right or none")
-    await jog(daemon, axle.drive, config, -speed)
+    await jog(daemon, axle.drive, config, -speed, brakes)
     turned = {name: angle - before[name] for name, angle in after.items()}
     return Steered(side, math.degrees(way_m / config.wheel_radius_m), turned)
 

@@ -198,9 +198,8 @@ class Script:
         """Commands that are typed in the other terminal before the last question is answered."""
         commands = []
         while self._next < len(self._lines) and self._lines[self._next].startswith(INDENT):
-            commands += [self._lines[self._next].removeprefix(ELSEWHERE)] * self._lines[self._next].startswith(
-                ELSEWHERE
-            )
+            if self._lines[self._next].startswith(ELSEWHERE):
+                commands.append(self._lines[self._next].removeprefix(ELSEWHERE))
             self._next += 1
         return commands
 
