@@ -111,7 +111,7 @@ async def test_a_pad_that_is_unplugged_at_full_speed_leaves_the_robot_at_rest_in
     name: str, sticks: dict[str, float]
 ) -> None:
     async with hands_on(name) as hands:
-        await hands.push(5.0, **sticks)
+        await hands.push(3.0, **sticks)
         assert hands.speed_m_s > 0.95 * hands.robot.app.profile.limits.speed_m_s
         hands.held.pad.lose("No such device")
         await hands.rests_within(hands.mapping.rest_s)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from daemon.cli.joystick import RETRY_S
+from daemon.cli import joystick
 from daemon.cli.main import main
 from daemon.gamepad import pad, pads
 from vcan_tests.daemon.gamepad.recorded_pad import button_events, stick_events, untouched
@@ -30,6 +30,7 @@ def device(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     machine = Machine(tmp_path)
     monkeypatch.setattr(pads, "SYSFS", machine.sysfs)
     monkeypatch.setattr(pads, "DEVICES", machine.devices)
+    monkeypatch.setattr(joystick, "RETRY_S", 0.2)
     monkeypatch.setattr(pad, "snapshot", lambda device, info: untouched())
     path = machine.plug(7, NAME, XBOX_ABS, XBOX_KEYS)
     path.unlink()
@@ -83,7 +84,7 @@ class Person:
     def plug_in(self) -> None:
         """It has one again, and the command has had the time to see it."""
         self.wire = os.open(self.device, os.O_RDWR)
-        threading.Event().wait(2 * RETRY_S)
+        threading.Event().wait(4 * joystick.RETRY_S)
 
     def ends(self) -> None:
         """The command is over, and nothing was wrong."""
@@ -118,11 +119,9 @@ def test_a_pad_drives_is_unplugged_comes_back_and_drives_again(
     assert "hold BTN_TL to drive; let go of it and the robot is at rest within 2.8 s" in told
 
 
-@pytest.mark.real_time
-def test_without_the_pad_that_is_asked_for_it_ends_at_once(bench: Bench) -> None:
-    done = bench.canhelm("drive", "joystick", "--pad", "No Such Pad")
-    assert done.returncode == 4
-    assert "no gamepad 'No Such Pad' is here" in done.stderr
+def test_without_the_pad_that_is_asked_for_it_ends_at_once(device: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["drive", "joystick", "--pad", "No Such Pad"]) == 4
+    assert "no gamepad 'No Such Pad' is here" in capsys.readouterr().err
 
 
 def test_the_list_is_one_object_a_line(device: Path, capsys: pytest.CaptureFixture[str]) -> None:
