@@ -141,6 +141,11 @@ def test_the_completions_are_there_under_the_names_that_shells_look_for() -> Non
     }
 
 
+def test_the_shell_can_read_its_completions() -> None:
+    checked = subprocess.run(["bash", "-n"], input=completions()["canhelm"], capture_output=True, text=True)
+    assert (checked.returncode, checked.stderr) == (0, "")
+
+
 # -- writing ----------------------------------------------------------------------------------------------------------
 
 
