@@ -138,7 +138,7 @@ def _bend_near(travel: complex, start: complex, end: complex, side: float, guess
         return travel - shortest * way, by_u0 * -shortest, by_u1 * -shortest
 
     ends = solve_pair(missing, guess, ROUNDING * (abs(travel) + abs(change) ** 2), 1.5)
-    return bend_between(start, end, side, *ends) if ends else None
+    return bend_between(start, end, side, *ends) if ends and ends[0] < ends[1] else None
 
 
 def bend_between(start: complex, end: complex, side: float, u0: float, u1: float) -> Bend:

@@ -110,10 +110,9 @@ def _turns(travel: complex, start: complex, end: complex, heading: complex) -> I
 
 def _surely_fastest(way: Chain, travel: complex, start: complex, end: complex) -> bool:
     """Whether no way is faster, or none by much."""
-    first = way.arcs[0]
-    return (isinstance(first, Bend) and len(way.arcs) == 1 and leads_farthest(first, end)) or any(
-        way.duration <= LIKELY * least for least in _least_times(travel, start, end)
-    )
+    if len(way.arcs) == 1 and isinstance(arc := way.arcs[0], Bend) and leads_farthest(arc, end):
+        return True
+    return any(way.duration <= LIKELY * least for least in _least_times(travel, start, end))
 
 
 def _least_times(travel: complex, start: complex, end: complex) -> Iterator[float]:

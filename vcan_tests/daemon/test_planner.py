@@ -233,6 +233,22 @@ def test_an_arc_moves_as_it_says_and_accelerates_by_one(arc: Arc) -> None:
         assert abs(acceleration) == pytest.approx(1.0, abs=1e-8)
 
 
+@pytest.mark.parametrize(
+    ("travel", "start", "end"),
+    [
+        (-4.9e-10 + 1.3683j, 1j, 1e-17 + 0.5j),
+        (3.3e-11 + 2.5155j, 1j, 0.67602j),
+        (3e-6 + 3.3033j, 1j, 0.56766j),
+        (-3.3e-12 + 0j, 0.69413 - 0.71984j, 0.69413 - 0.71984j),
+        (1e-9 + 0.0776j, 0j, 0.3372j),
+        (6.78 + 0.0265j, 1j, 0.9999999996 + 0j),
+    ],
+)
+def test_what_is_nearly_on_a_line_has_a_way(travel: complex, start: complex, end: complex) -> None:
+    _, way = fastest_way(travel, start, end)
+    assert misses(way, travel, end) < ROUNDING
+
+
 def test_stop_and_go_leads_to_every_goal() -> None:
     for problem in random_problems(50, SEED):
         travel, start, end = complex(0.3 * problem.goal.x, problem.goal.y), 0.5 - 0.3j, -0.2 + 0.6j
