@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Coroutine
-from contextlib import suppress
 from typing import Any, Final, Protocol
 
 from canhelm.errors import CanhelmError, DaemonNotRunning, Refused, Timeout
@@ -73,6 +72,7 @@ class PadDriver:
         finally:
             self._let_go()
             await asyncio.gather(*self._errands, return_exceptions=True)
+        self._look_after_errands()
         self._say(f"{pad.name} has gone ({pad.gone}): the robot is at rest")
 
     async def _step(self, pad: Pad) -> None:
@@ -157,9 +157,12 @@ class PadDriver:
             self._motion = self._end_of_motion = None
 
     async def _end(self, motion: str, ended: asyncio.Task[dict[str, Any]]) -> None:
-        with suppress(Refused):  # it is over already
+        try:
             await self._client.call("motion.stop", motion=motion)
-        await _ending(ended)
+        except Refused:
+            pass  # it is over already
+        finally:
+            await _ending(ended)
         self._say("at rest")
 
     async def _stop(self, method: str, **params: Any) -> None:
@@ -170,10 +173,15 @@ class PadDriver:
         self._errands.add(asyncio.create_task(errand))
 
     def _look_after_errands(self) -> None:
-        """Raise what has gone wrong with one that is done."""
+        """Raise that the daemon is lost, and tell what else has gone wrong with those that are done."""
         for errand in [errand for errand in self._errands if errand.done()]:
             self._errands.discard(errand)
-            errand.result()
+            try:
+                errand.result()
+            except (DaemonNotRunning, Timeout):
+                raise
+            except CanhelmError as error:
+                self._lock(str(error))
 
     def _say(self, sentence: str) -> None:
         """Tell a sentence that is not the last one."""

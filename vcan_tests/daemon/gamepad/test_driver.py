@@ -29,6 +29,7 @@ class ToldDaemon:
     Attributes:
         calls: time, method and parameters.
         refusal: what drive.set is refused with.
+        stop_failure: what stops fail with.
         delay_s: that each answer to drive.set takes.
         rest_s: that stops take.
         motion: the one that runs, or ran last.
@@ -37,6 +38,7 @@ class ToldDaemon:
     def __init__(self) -> None:
         self.calls: list[tuple[float, str, dict[str, Any]]] = []
         self.refusal: CanhelmError | None = None
+        self.stop_failure: CanhelmError | None = None
         self.delay_s = 0.0
         self.rest_s = 0.5
         self.motion = 0
@@ -50,6 +52,9 @@ class ToldDaemon:
             assert self._end is not None
             return await asyncio.shield(self._end)
         await asyncio.sleep(self.rest_s)
+        if self.stop_failure:
+            self.end(self.stop_failure)
+            raise self.stop_failure
         self.end(Refused("the motion was stopped"))
         return {}
 
@@ -247,6 +252,26 @@ async def test_a_lost_daemon_ends_it(hands: Hands) -> None:
     hands.daemon.refusal = DaemonNotRunning("the daemon hung up")
     with pytest.raises(DaemonNotRunning):
         await hands.driving
+
+
+async def test_a_daemon_that_is_lost_while_the_robot_stops_is_not_told_as_rest(hands: Hands) -> None:
+    await hands.begin()
+    hands.daemon.stop_failure = DaemonNotRunning("the daemon hung up")
+    hands.held.pad.lose("No such device")
+    with pytest.raises(DaemonNotRunning):
+        await hands.driving
+    assert not any("at rest" in told for told in hands.told)
+
+
+async def test_a_stop_that_fails_is_told_and_the_buttons_go_on_working(hands: Hands) -> None:
+    hands.daemon.stop_failure = DeviceFault("rear_left does not come to rest")
+    await asyncio.sleep(0.1)
+    hands.held.press("BTN_SOUTH")
+    await asyncio.sleep(1.0)
+    hands.held.press("BTN_EAST")
+    await asyncio.sleep(0.1)
+    assert any("rear_left does not come to rest" in told for told in hands.told)
+    assert len(hands.daemon.asked("estop")) == 1
 
 
 async def test_whoever_interrupts_it_leaves_the_robot_at_rest(hands: Hands) -> None:
