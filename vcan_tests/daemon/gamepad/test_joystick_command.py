@@ -51,6 +51,7 @@ class Person:
     """Somebody with a pad in a thread of their own; the command has the main one, for its signals.
 
     Attributes:
+        over: set when the command has ended.
         wrong: what this person has seen that should not be.
     """
 
@@ -58,7 +59,7 @@ class Person:
         self.wrong: list[BaseException] = []
         self.device = device
         self.wire = os.open(device, os.O_RDWR)
-        self._ended = threading.Event()
+        self.over = threading.Event()
         self._thread = threading.Thread(target=self._act, args=(acts,))
         self._thread.start()
 
@@ -67,7 +68,7 @@ class Person:
             acts(self)
         except BaseException as error:  # noqa: BLE001 - told in the main thread
             self.wrong.append(error)
-        if not self._ended.is_set():
+        if not self.over.is_set():
             os.kill(os.getpid(), signal.SIGINT)
 
     def begin(self) -> None:
@@ -88,7 +89,7 @@ class Person:
 
     def ends(self) -> None:
         """The command is over, and nothing was wrong."""
-        self._ended.set()
+        self.over.set()
         self._thread.join()
         assert not self.wrong, self.wrong
 
@@ -117,6 +118,26 @@ def test_a_pad_drives_is_unplugged_comes_back_and_drives_again(
     assert told.count(f"{NAME} has gone (it says no more): the robot is at rest") == 2
     assert f"waiting for {NAME}" in told
     assert "hold BTN_TL to drive; let go of it and the robot is at rest within 2.8 s" in told
+
+
+@pytest.mark.real_time
+@pytest.mark.timeout(60)
+def test_a_daemon_that_dies_on_the_way_ends_it(bench: Bench, device: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def acts(person: Person) -> None:
+        person.begin()
+        bench.wait_for(lambda status: speeds(status)[0] > 0.3)
+        bench.process.kill()
+        person.over.wait(30.0)
+
+    person = Person(device, acts)
+    try:
+        code = main(["drive", "joystick", "--socket", str(bench.socket)])
+    finally:
+        person.ends()
+    assert code == 3
+    told = capsys.readouterr().err.splitlines()
+    assert told[-1].startswith("canhelm: the daemon hung up")
+    assert all(line.startswith("canhelm: ") for line in told)
 
 
 def test_without_the_pad_that_is_asked_for_it_ends_at_once(device: Path, capsys: pytest.CaptureFixture[str]) -> None:
