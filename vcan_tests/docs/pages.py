@@ -12,10 +12,9 @@ from pathlib import Path
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
-from daemon.reference.pages import site_pages
+from daemon.reference.pages import PAGES
 
 ROOT = Path(__file__).resolve().parents[2]
-GENERATED = "docs/reference"
 BESIDE = ("README.md", "CONTRIBUTING.md")
 """Pages that are no part of the site."""
 
@@ -70,11 +69,26 @@ class Block:
 
 
 @cache
-def pages() -> dict[str, str]:
-    """Every page as Markdown by its path in the repository, those made from tables included."""
-    written = {path.relative_to(ROOT).as_posix(): path.read_text("utf-8") for path in sorted(ROOT.glob("docs/*.md"))}
-    beside = {name: (ROOT / name).read_text("utf-8") for name in BESIDE}
-    return written | beside | {f"{GENERATED}/{name}": text for name, text in site_pages().items()}
+def written() -> dict[str, str]:
+    """Every page that people write, as Markdown, by its path in the repository."""
+    paths = [*sorted(ROOT.glob("docs/*.md")), *(ROOT / name for name in BESIDE)]
+    return {path.relative_to(ROOT).as_posix(): path.read_text("utf-8") for path in paths}
+
+
+GENERATED = {f"docs/reference/{name}": make for name, make in PAGES.items()}
+"""What makes the other pages, by the paths that these have in the site."""
+NAMES = [*written(), *GENERATED]
+
+
+@cache
+def text_of(page: str) -> str:
+    """A page as Markdown."""
+    return written()[page] if page in written() else GENERATED[page]()
+
+
+@cache
+def _parsed(text: str) -> list[Token]:
+    return _PARSER.parse(text)
 
 
 def _flat(tokens: list[Token]) -> Iterator[Token]:
@@ -83,15 +97,10 @@ def _flat(tokens: list[Token]) -> Iterator[Token]:
         yield from _flat(token.children or [])
 
 
-def tokens(text: str) -> list[Token]:
-    """All tokens of a page, those within lines included."""
-    return list(_flat(_PARSER.parse(text)))
-
-
 def blocks(text: str) -> Iterator[Block]:
     """The fenced blocks of a page in their order; a comment that holds a whole file counts as one."""
     said: dict[str, str] = {}
-    for token in _PARSER.parse(text):
+    for token in _parsed(text):
         comment = _COMMENT.match(token.content) if token.type == "html_block" else None
         begin = token.map[0] + 1 if token.map else 0
         if token.type == "fence":
@@ -106,24 +115,25 @@ def blocks(text: str) -> Iterator[Block]:
 
 def indented(text: str) -> list[str]:
     """Lines of the blocks of a page that are only indented."""
-    return [line for token in _PARSER.parse(text) if token.type == "code_block" for line in token.content.splitlines()]
+    return [line for token in _parsed(text) if token.type == "code_block" for line in token.content.splitlines()]
 
 
 def code_spans(text: str) -> set[str]:
     """What stands in backticks within the lines of a page."""
-    return {token.content for token in tokens(text) if token.type == "code_inline"}
+    return {token.content for token in _flat(_parsed(text)) if token.type == "code_inline"}
 
 
 def links(text: str) -> set[str]:
     """Where the links and pictures of a page lead."""
-    found = {str(token.attrs.get("href") or token.attrs.get("src")) for token in tokens(text) if token.attrs}
+    found = {str(token.attrs.get("href") or token.attrs.get("src")) for token in _flat(_parsed(text)) if token.attrs}
     return found - {"None"}
 
 
+@cache
 def anchors(text: str) -> set[str]:
     """The names by which links find the headings of a page, as GitHub and the site make them."""
     found: set[str] = set()
-    parsed = _PARSER.parse(text)
+    parsed = _parsed(text)
     for opening, inline in itertools.pairwise(parsed):
         if opening.type == "heading_open":
             words = "".join(token.content for token in inline.children or [])
@@ -135,6 +145,6 @@ def anchors(text: str) -> set[str]:
 
 def listed() -> set[str]:
     """The pages that the site's list of contents names."""
-    trees = [block.text for block in blocks(pages()["docs/index.md"]) if block.language == "{toctree}"]
+    trees = [block.text for block in blocks(text_of("docs/index.md")) if block.language == "{toctree}"]
     names = [line for tree in trees for line in tree.splitlines() if line and not line.startswith(":")]
     return {f"docs/{name}.md" for name in names}

@@ -11,7 +11,7 @@ import pytest
 from cyclopts import App
 
 from daemon.cli.main import whole_app
-from vcan_tests.docs.pages import BESIDE, ROOT, anchors, blocks, code_spans, indented, links, listed, pages
+from vcan_tests.docs.pages import BESIDE, NAMES, ROOT, anchors, blocks, code_spans, indented, links, listed, text_of
 
 COMMAND = re.compile(r"\s*(\$ )?(sudo )?canhelm [a-z]")
 HEADINGS = 6
@@ -19,18 +19,18 @@ HEADINGS = 6
 
 
 def test_every_page_stands_in_the_list_of_contents_and_every_entry_is_a_page() -> None:
-    written = set(pages()) - {"docs/index.md", *BESIDE}
+    written = set(NAMES) - {"docs/index.md", *BESIDE}
     assert written - listed() == set(), "name these pages in a list of docs/index.md"
     assert listed() - written == set(), "these entries of docs/index.md have no page"
 
 
 def test_the_list_of_contents_has_few_parts() -> None:
-    assert pages()["docs/index.md"].count(":caption:") <= HEADINGS
+    assert text_of("docs/index.md").count(":caption:") <= HEADINGS
 
 
-@pytest.mark.parametrize("page", pages())
+@pytest.mark.parametrize("page", NAMES)
 def test_no_link_is_dead(page: str) -> None:
-    dead = [link for link in links(pages()[page]) if not leads_somewhere(page, link)]
+    dead = [link for link in links(text_of(page)) if not leads_somewhere(page, link)]
     assert dead == []
 
 
@@ -40,19 +40,19 @@ def leads_somewhere(page: str, link: str) -> bool:
     if parts.scheme or parts.netloc:
         return parts.scheme in ("http", "https") and "." in parts.netloc
     path = os.path.normpath(os.path.join(os.path.dirname(page), parts.path)) if parts.path else page
-    if path not in pages():
+    if path not in NAMES:
         return (ROOT / path).is_file() and not parts.fragment
-    return not parts.fragment or parts.fragment in anchors(pages()[path])
+    return not parts.fragment or parts.fragment in anchors(text_of(path))
 
 
 def test_a_missing_heading_is_a_dead_link() -> None:
     assert not leads_somewhere("docs/index.md", "drives.md#a-heading-that-is-not-there")
 
 
-@pytest.mark.parametrize("page", pages())
+@pytest.mark.parametrize("page", NAMES)
 def test_commands_stand_in_console_blocks(page: str) -> None:
-    other = [block.text for block in blocks(pages()[page]) if block.language not in ("console", "bash", "sh")]
-    lines = [*indented(pages()[page]), *itertools.chain.from_iterable(text.splitlines() for text in other)]
+    other = [block.text for block in blocks(text_of(page)) if block.language not in ("console", "bash", "sh")]
+    lines = [*indented(text_of(page)), *itertools.chain.from_iterable(text.splitlines() for text in other)]
     assert [line for line in lines if COMMAND.match(line)] == []
 
 
@@ -61,9 +61,9 @@ def app() -> App:
     return whole_app()
 
 
-@pytest.mark.parametrize("page", pages())
+@pytest.mark.parametrize("page", NAMES)
 def test_a_command_within_a_sentence_has_words_and_options_that_exist(app: App, page: str) -> None:
-    typed = [span for span in code_spans(pages()[page]) if re.match(r"canhelm [a-z]", span)]
+    typed = [span for span in code_spans(text_of(page)) if re.match(r"canhelm [a-z]", span)]
     assert [span for span in typed if unknown_word(app, span)] == []
 
 
