@@ -55,7 +55,7 @@ def _contents(findings: Sequence[Mapping[str, Any]], options: Options) -> Iterat
     yield "doctor.json", _json(findings)
     yield from _of_daemons(options)
     yield "journal.txt", _journal()
-    yield from _last_run(options.robot)
+    yield from _last_runs(options.robot)
 
 
 def _of_daemons(options: Options) -> Iterator[tuple[str, str | bytes]]:
@@ -86,7 +86,8 @@ def _journal() -> str:
     return done.stdout + done.stderr
 
 
-def _last_run(robot: str | None) -> Iterator[tuple[str, str | bytes]]:
+def _last_runs(robot: str | None) -> Iterator[tuple[str, str | bytes]]:
+    """The newest run, and the newest fault."""
     try:
         runs = store.read_runs(store.all_folders(None, os.environ), robot)
     except CanhelmError as error:
@@ -95,8 +96,10 @@ def _last_run(robot: str | None) -> Iterator[tuple[str, str | bytes]]:
     if not runs:
         yield "run.txt", "there are no runs\n"
         return
-    for file in sorted(runs[-1].folder.iterdir()):
-        yield f"run/{file.name}", _tail(file)
+    faults = [run for run in runs if run.facts.get("kind") == store.FAULT]
+    for name, run in (("run", runs[-1]), *(("fault", fault) for fault in faults[-1:])):
+        for file in sorted(run.folder.iterdir()):
+            yield f"{name}/{file.name}", _tail(file)
 
 
 def _tail(file: Path) -> bytes:

@@ -1,4 +1,4 @@
-"""``canhelm runs``: what motions have left; list, show, delete."""
+"""``canhelm runs``: what motions and faults have left; list, show, delete."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from canhelm.errors import UsageError
 from daemon.cli.output import Json, say, show
 from daemon.runs import store
 from daemon.runs.signs import read_signs
-from daemon.runs.store import LAST, OFF, PROFILE, Run
+from daemon.runs.store import FAULT, LAST, OFF, PROFILE, Run
 from daemon.runs.table import read_table
 
 if TYPE_CHECKING:
@@ -91,6 +91,7 @@ def summary(run: Run) -> dict[str, Any]:
         "begun": run.begun,
         "robot": run.robot,
         "vehicle": facts.get("vehicle"),
+        "kind": facts.get("kind", "motion"),
         "motion": facts.get("motion"),
         "duration_s": facts.get("duration_s"),
         "ended": facts.get("ended"),
@@ -109,6 +110,7 @@ def _table(rows: Sequence[Mapping[str, Any]]) -> Table:
         told = f"{ended}: {row['message']}" if row["message"] else ended
         duration = "-" if row["duration_s"] is None else f"{row['duration_s']:.1f}"
         begun = str(row["begun"])[:19].replace("T", " ")
-        cells = [str(row["run"]), begun, str(row["robot"]), str(row["vehicle"] or "-"), str(row["motion"] or "-")]
+        motion = f"fault in {row['motion'] or 'no motion'}" if row["kind"] == FAULT else str(row["motion"] or "-")
+        cells = [str(row["run"]), begun, str(row["robot"]), str(row["vehicle"] or "-"), motion]
         grid.add_row(*map(Text, [*cells, duration, told, f"{row['size_bytes'] / 1e6:.1f}"]))
     return grid

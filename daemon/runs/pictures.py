@@ -88,7 +88,10 @@ def _title(run: Run, signs: list[str]) -> str:
     ended = str(facts.get("ended", "not ended"))
     if facts.get("message"):
         ended = f"{ended}: {facts['message']}"
-    lines = [f"run {run.number} of {run.robot}: {facts.get('motion')}, {run.begun}, {ended}", *signs]
+    lines = [
+        f"run {run.number} of {run.robot}: {facts.get('motion') or facts.get('kind')}, {run.begun}, {ended}",
+        *signs,
+    ]
     return "\n".join(part for line in lines for part in textwrap.wrap(line, 130))
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import yaml
 
 from canhelm.errors import CanhelmError, ConfigError, UsageError
@@ -19,6 +20,12 @@ SYSTEM_FOLDER = Path("/var/lib/canhelm")
 RUNS = "runs"
 FACTS, PROFILE, DRIVES = "run.yaml", "profile.yaml", "drives.yaml"
 CYCLES, TERMS, FRAMES = "cycles.csv", "terms.jsonl", "frames.log"
+RECORDS, EVENTS = "records.jsonl", "events.jsonl"
+"""Of a fault alone."""
+FAULT = "fault"
+"""The kind of a run that no motion but a fault has left."""
+DRAFT = ".draft"
+"""A run that is being written and has no number yet; what a crash has left of one is overwritten by the next."""
 LIMIT_BYTES = 200_000_000
 """What all runs of a robot may take, unless told otherwise."""
 PARTS = 8
@@ -88,10 +95,35 @@ class RunStore:
         """A new folder for a run, with room made for it. Raises OSError."""
         self.folder.mkdir(parents=True, exist_ok=True)
         self.make_room()
-        number = max((int(path.name) for path in self.folders()), default=0) + 1
-        folder = self.folder / f"{number:04d}"
+        folder = self._next()
         folder.mkdir()
         return folder
+
+    def keep(self, files: Mapping[str, Sequence[bytes | bytearray]]) -> Path:
+        """A new run whose files are all known, by name and in pieces.
+
+        It is there as a whole and on the disk when this returns; whatever ends the process or the machine before
+        leaves none of it (rename(2) is atomic, and on the disk after an fsync(2) of the folder). Raises OSError.
+        """
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.make_room()
+        draft = self.folder / DRAFT
+        shutil.rmtree(draft, ignore_errors=True)
+        draft.mkdir()
+        for name, pieces in files.items():
+            with (draft / name).open("xb") as file:
+                file.writelines(pieces)
+                file.flush()
+                os.fsync(file.fileno())
+        _sync(draft)
+        folder = self._next()
+        draft.rename(folder)
+        _sync(self.folder)
+        return folder
+
+    def _next(self) -> Path:
+        number = max((int(path.name) for path in self.folders()), default=0) + 1
+        return self.folder / f"{number:04d}"
 
     def make_room(self) -> None:
         """Delete the oldest runs until there is room for one more. Raises OSError where the disk is full."""
@@ -107,6 +139,15 @@ class RunStore:
 
     def _free_bytes(self) -> int:
         return shutil.disk_usage(self.folder).free
+
+
+def _sync(folder: Path) -> None:
+    """Have the names in a folder on the disk."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def size_of(folder: Path) -> int:
@@ -197,6 +238,12 @@ def delete(run: Run) -> None:
     except OSError as error:
         remedy = "do it as the user that runs the daemon"
         raise CanhelmError(f"run {run.number} cannot be deleted: {error.strerror}", remedy=remedy) from error
+
+
+def make_yaml(value: Any) -> bytes:
+    """As plain lists, mappings, numbers and words, which is all that YAML takes."""
+    plain = msgspec.json.decode(msgspec.json.encode(value, enc_hook=str))
+    return yaml.safe_dump(plain, sort_keys=False, allow_unicode=True).encode()
 
 
 def read_yaml(path: Path) -> dict[str, Any]:

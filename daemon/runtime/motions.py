@@ -83,6 +83,11 @@ class Motion(ABC):
         """The motion for ``status``."""
         return {"motion": self.identity, "kind": self.kind, "drives": list(self.drives), **self.progress()}
 
+    @property
+    def terms(self) -> object:
+        """What is recorded of its newest step: the terms of its law, or its progress where it has no law."""
+        return self.progress() if self.record is None else self.record
+
     async def result(self) -> dict[str, Any]:
         """Wait until it is closed; its result. Raises the error that ended it."""
         await self.closed.wait()

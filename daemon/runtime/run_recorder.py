@@ -1,4 +1,4 @@
-"""Each motion leaves a run: what was asked, measured and commanded, and every frame meanwhile."""
+"""Each motion leaves a run: what was asked, measured and commanded, and every frame meanwhile; so does each fault."""
 
 from __future__ import annotations
 
@@ -6,20 +6,33 @@ import asyncio
 import logging
 import platform
 import time
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import msgspec
-import yaml
 
 from canhelm import __version__
 from canhelm.errors import CanhelmError
-from daemon.runs.store import CYCLES, DRIVES, FACTS, FRAMES, PROFILE, TERMS, RunStore
+from daemon.runs.store import (
+    CYCLES,
+    DRIVES,
+    EVENTS,
+    FACTS,
+    FAULT,
+    FRAMES,
+    PROFILE,
+    RECORDS,
+    TERMS,
+    RunStore,
+    make_yaml,
+)
 from daemon.runtime.clock import VirtualTimeLoop
 from daemon.runtime.cycle_rows import CycleRows
 from daemon.runtime.disk import Disk
+from daemon.runtime.flight_recorder import KEPT_S, FlightRecorder, Slice
 from daemon.runtime.motions import Motion
 from daemon.runtime.supervisor import Supervisor
 from drivers.bus.candump import make_line
@@ -63,7 +76,7 @@ class Recording:
 
 
 class RunRecorder:
-    """Records every motion into a folder of its own.
+    """Records every motion into a folder of its own, and with every fault the last minute before it.
 
     Nothing is written within a control cycle: rows and frames are gathered, and written by a thread once a second. A
     disk that fails or is full ends the recording of that run with a warning; the next run tries again.
@@ -88,6 +101,7 @@ class RunRecorder:
         self._spec = spec
         self._recordings: list[Recording] = []
         self._last: Path | None = None
+        self._given_up = False
 
     def start(self) -> None:
         """Record every motion from now on, on the running loop."""
@@ -96,6 +110,8 @@ class RunRecorder:
         self._epoch_s = 0.0 if virtual else time.time() - self._loop.time()
         self._disk = Disk(self._on_failure)
         self._rows = CycleRows(self._supervisor)
+        self._profile_yaml = make_yaml(self._profile)
+        self._flight = FlightRecorder(self._supervisor, self._store.run_bytes, self._keep_fault)
         self._supervisor.on_motion.append(self._on_motion)
         self._supervisor.observers.append(self._on_cycle)
         self._bus.taps.append(self._on_frame)
@@ -119,20 +135,25 @@ class RunRecorder:
     def _on_motion(self, motion: Motion) -> None:
         try:
             self._begin(motion)
+            self._flight.take_motion(motion, self._loop.time())
         except Exception:
             LOGGER.exception("the recording of runs failed")
             self._give_up()
 
     def _on_cycle(self) -> None:
+        if self._given_up:
+            return
         try:
             self._end_closed()
-            if self._recordings:
-                self._gather()
+            row = self._rows.row()
+            self._gather(row)
+            self._flight.take_cycle(row)
         except Exception:
             LOGGER.exception("the recording of runs failed")
             self._give_up()
 
     def _give_up(self) -> None:
+        self._given_up = True
         self._recordings.clear()
         self.message = "the recording of runs failed inside the daemon: report it with the log"
 
@@ -140,7 +161,7 @@ class RunRecorder:
 
     def _begin(self, motion: Motion, part: int = 1) -> None:
         self._end_closed()
-        self.message = ""
+        self.message, self._given_up = "", False
         recording = Recording(motion, part, self._loop.time())
         recording.facts = self._facts(recording)
         recording.cycles += self._rows.head
@@ -151,21 +172,28 @@ class RunRecorder:
     def _make_folder(self, recording: Recording, facts: dict[str, Any], drives: dict[str, Any]) -> None:
         """In the disk's thread: the folder, and what is known before the first cycle."""
         folder = self._store.begin()
-        _write_yaml(folder / PROFILE, self._profile)
-        _write_yaml(folder / DRIVES, drives)
-        _write_yaml(folder / FACTS, facts)
+        (folder / PROFILE).write_bytes(self._profile_yaml)
+        (folder / DRIVES).write_bytes(make_yaml(drives))
+        (folder / FACTS).write_bytes(make_yaml(facts))
         recording.folder = self._last = folder
 
     def _facts(self, recording: Recording) -> dict[str, Any]:
-        motion, vehicle = recording.motion, self._profile.vehicle
-        begun_unix_s = self._epoch_s + recording.begun_s
+        motion = recording.motion
         return {
-            "robot": self._profile.name,
-            "vehicle": vehicle.type if vehicle else None,
+            **self._place(recording.begun_s),
+            "kind": "motion",
             "motion": motion.kind,
             "asked": motion.asked,
             "drives": list(motion.drives),
             "part": recording.part,
+        }
+
+    def _place(self, begun_s: float) -> dict[str, Any]:
+        """Whose run it is, and since when; from loop time."""
+        vehicle, begun_unix_s = self._profile.vehicle, self._epoch_s + begun_s
+        return {
+            "robot": self._profile.name,
+            "vehicle": vehicle.type if vehicle else None,
             "begun": datetime.fromtimestamp(begun_unix_s, UTC).isoformat(timespec="milliseconds"),
             "begun_unix_s": round(begun_unix_s, 6),
             "bus": self._spec,
@@ -195,13 +223,12 @@ class RunRecorder:
     @staticmethod
     def _write_facts(recording: Recording, facts: dict[str, Any]) -> None:
         if recording.folder is not None:
-            _write_yaml(recording.folder / FACTS, facts)
+            (recording.folder / FACTS).write_bytes(make_yaml(facts))
 
     # --- gathering ---------------------------------------------------------------------------------------------
 
-    def _gather(self) -> None:
+    def _gather(self, row: str) -> None:
         now_s = self._loop.time()
-        row = self._rows.row()
         for recording in list(self._recordings):
             if not recording.failed:
                 self._take(recording, row, now_s)
@@ -215,21 +242,56 @@ class RunRecorder:
                 self._end(recording)
 
     def _take(self, recording: Recording, row: str, now_s: float) -> None:
-        motion, time_s = recording.motion, now_s - recording.begun_s
+        time_s = now_s - recording.begun_s
         recording.rows += 1
         recording.cycles += f"{time_s:.4f},{row}\n".encode()
-        terms = motion.progress() if motion.record is None else motion.record
-        recording.terms += msgspec.json.encode({"time_s": round(time_s, 4), "terms": terms}, enc_hook=str) + b"\n"
+        step = {"time_s": round(time_s, 4), "terms": recording.motion.terms}
+        recording.terms += msgspec.json.encode(step, enc_hook=str) + b"\n"
         if now_s - recording.flushed_s >= FLUSH_PERIOD_S:
             recording.flushed_s = now_s
             self._flush(recording)
 
     def _on_frame(self, can_id: int, data: bytes, timestamp_s: float) -> None:
-        if not self._recordings:
-            return
         line = f"{make_line(self._epoch_s + timestamp_s, self._bus.name, can_id, data)}\n".encode()
         for recording in self._recordings:
             recording.frames += line
+        self._flight.take_frame(line, timestamp_s)
+
+    # --- faults ------------------------------------------------------------------------------------------------
+
+    def _keep_fault(self, slices: Sequence[Slice]) -> None:
+        supervisor, now_s = self._supervisor, self._loop.time()
+        facts = {
+            **self._place(slices[0].begun_s),
+            "kind": FAULT,
+            "motion": ", ".join(motion.kind for motion in supervisor.motions.values()) or None,
+            "clock_unix_s": round(self._epoch_s, 6),
+            "duration_s": round(now_s - slices[0].begun_s, 3),
+            "ended": str(supervisor.state),
+            "message": supervisor.message,
+        }
+        events = [event for event in supervisor.log.events if event["time_s"] >= now_s - KEPT_S]
+        self._disk.do(partial(self._write_fault, slices, facts, self._confirmed(), events))
+
+    def _write_fault(
+        self, slices: Sequence[Slice], facts: dict[str, Any], drives: dict[str, Any], events: list[dict[str, Any]]
+    ) -> None:
+        """In the disk's thread."""
+        rows = sum(kept.cycles.count(b"\n") for kept in slices)
+        files: dict[str, list[bytes | bytearray]] = {
+            FACTS: [make_yaml({**facts, "rows": rows})],
+            PROFILE: [self._profile_yaml],
+            DRIVES: [make_yaml(drives)],
+            EVENTS: [msgspec.json.encode(event) + b"\n" for event in events],
+            CYCLES: [self._rows.head, *(kept.cycles for kept in slices)],
+            RECORDS: [kept.records for kept in slices],
+            FRAMES: [kept.frames for kept in slices],
+        }
+        self._last = folder = self._store.keep(files)
+        told = f"the last {facts['duration_s']:.1f} s before it are run {int(folder.name)}"
+        self._loop.call_soon_threadsafe(
+            self._supervisor.log.add, "info", "runs", told, f"`canhelm runs show {int(folder.name)}`"
+        )
 
     # --- writing -----------------------------------------------------------------------------------------------
 
@@ -274,12 +336,3 @@ def _ending(motion: Motion) -> dict[str, Any]:
     name = "stopped" if motion.stop_reason else type(error).__name__
     message = error.message if isinstance(error, CanhelmError) else str(error)
     return {"ended": name, "message": message, "result": {}}
-
-
-def _plain(value: Any) -> Any:
-    """As plain lists, mappings, numbers and words, which is all that YAML takes."""
-    return msgspec.json.decode(msgspec.json.encode(value, enc_hook=str))
-
-
-def _write_yaml(path: Path, value: Any) -> None:
-    path.write_text(yaml.safe_dump(_plain(value), sort_keys=False, allow_unicode=True), encoding="utf-8")

@@ -40,6 +40,16 @@ def test_a_bundle_holds_versions_findings_journal_and_the_last_run(home: Path) -
     assert any(finding["check"] == "python" for finding in json.loads(files["doctor.json"]))
 
 
+def test_a_bundle_holds_the_last_fault_as_well(home: Path) -> None:
+    runs = home / "state" / "canhelm" / "max2d" / "runs"
+    for number in (2, 3):
+        (runs / f"000{number}").mkdir()
+        facts = f"robot: max2d\nkind: fault\nbegun: '2025-01-0{number}'\n"
+        (runs / f"000{number}" / "run.yaml").write_text(facts)
+    files = packed(home)
+    assert (b"2026-01-01" in files["run/run.yaml"], b"2025-01-03" in files["fault/run.yaml"]) == (True, True)
+
+
 def test_a_bundle_holds_the_status_and_the_profile_of_a_daemon(home: Path) -> None:
     class Known(FakeBackend):
         def status(self) -> dict[str, Any]:
