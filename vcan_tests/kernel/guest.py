@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import fcntl
 import os
+import resource
 import shlex
 import shutil
 import socket
@@ -65,6 +66,7 @@ async def run_in_guest(
     kernel = fetch_kernel()
     _furnish(exchange, kernel, "run_systemd.sh" if systemd else "run_plain.sh")
     _write_script(exchange / "command", command, environment or {})
+    _allow_many_files()
     with _own_cpu() as cpu, _serial_cable() as ends:
         command_line = _command_line(kernel, exchange, cpu, ends, show_kernel)
         ended = await run_to_end(command_line, timeout_s, ends, output)
@@ -114,6 +116,12 @@ def _command_line(kernel: Kernel, exchange: Path, cpu: int, cable: tuple[int, in
     serial = [f"ssl{number}=fd:{end}" for number, end in enumerate(cable)]
     output = ["con=null", "con0=null,fd:1", *(["loglevel=7"] if show_kernel else ["quiet", "loglevel=0"])]
     return [*start, str(kernel.program), *root, *place, *serial, *output, "systemd.unit=guest.target"]
+
+
+def _allow_many_files() -> None:
+    """A guest keeps each of the host's files open that it has ever looked into; many systems allow 1024."""
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
 
 
 @contextmanager

@@ -15,6 +15,7 @@ rm -rf .dockerenv run/.containerenv etc/systemd/system/*.wants etc/systemd/syste
 echo 00000000000000000000000000000001 >etc/machine-id
 mkdir -p etc/tmpfiles.d run/systemd/system
 ln -sf /dev/null etc/tmpfiles.d/tmp.conf # boot would sweep the host's /tmp, file by file, through the RAM disk
+rm -f var/lib/man-db/auto-update # each installed package would have all pages of the machine read anew
 for unit in systemd-binfmt.service proc-sys-fs-binfmt_misc.automount; do # modules that this kernel has not
 	ln -s /dev/null "run/systemd/system/$unit"
 done
