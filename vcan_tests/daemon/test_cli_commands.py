@@ -84,6 +84,23 @@ SENT: list[tuple[str, str, dict[str, Any]]] = [
     ("sim power all off", "simulation.power", {"node": "all", "on": False}),
     ("sim turn front 12.5", "simulation.turn", {"node": "front", "angle_deg": 12.5}),
     ("sim turn front", "simulation.turn", {"node": "front", "angle_deg": None}),
+    (
+        "sim fault silence front_left --for 2",
+        "simulation.fault",
+        {"kind": "silence", "part": "front_left", "for_s": 2.0},
+    ),
+    (
+        "sim fault lose --cob-id 0x183 --probability 0.1 --at-frame 100",
+        "simulation.fault",
+        {"kind": "lose", "cob_id": 0x183, "probability": 0.1, "at_frame": 100},
+    ),
+    (
+        "sim fault emcy 3 --code 0x4210 --at 1.5",
+        "simulation.fault",
+        {"kind": "emcy", "part": 3, "code": 0x4210, "at_s": 1.5},
+    ),
+    ("sim fault clear", "simulation.clear_faults", {"fault": None}),
+    ("sim fault clear 2", "simulation.clear_faults", {"fault": 2}),
     ("sim input 3 1 low", "simulation.input", {"node": 3, "input": 1, "level": "low"}),
 ]
 
@@ -122,7 +139,7 @@ CODES = [
     ("demo --seed 1.9", 2, "1.9"),
     ("steer front inf", 2, "angle_deg is inf: not a finite number"),
     ("steer front 1e30", 2, "angle_deg (1e+30) is not a number from -1e15 to 1e15"),
-    ("motor position 1 9876543210", 2, "stay within -2147483648 .. 2147483647 qc"),
+    ("motor position 1 9876543210", 2, "give -2147483648 to 2147483647 qc"),
     ("motor enable 7", 4, "node 7 does not answer - check its power"),
     ("motor enable 9", 6, "emergency stop"),
 ]
