@@ -240,6 +240,15 @@ def test_through_can_the_whole_daemon_settles_on_the_line() -> None:
     assert out.worst_position_m < 0.11
 
 
+@pytest.mark.parametrize("state", [State("circle", 0.2, 10.0), State("line", 0.2, -10.0)])
+def test_through_can_the_sensors_noise_does_not_keep_the_cascade_from_settling(state: State) -> None:
+    (case,) = following("thesis", [state], "cascade", 60.0, "can")
+    ((_, found),) = drive_batch([case])
+    assert found.settle_m is not None
+    assert found.settle_m < 1.85
+    assert found.worst_bending_deg < 32.0
+
+
 def test_a_run_through_can_is_the_same_every_time() -> None:
     (case,) = following("thesis", [State("circle", heading_deg=5.0)], "cascade", 60.0, "can")
     assert drive_batch([case]) == drive_batch([case])
