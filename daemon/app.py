@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from socket import socket as Socket
@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING
 
 from canhelm.errors import BusOff
 from daemon.runs.store import RunStore
-from daemon.runtime.clock import VirtualTimeLoop
 from daemon.runtime.commands import Commands
 from daemon.runtime.cycle import Cycle
 from daemon.runtime.localising import Localiser
-from daemon.runtime.recorder import CandumpRecorder
+from daemon.runtime.recorder import LIMIT_BYTES, CandumpRecorder
 from daemon.runtime.run_recorder import RunRecorder
 from daemon.runtime.service import Service
 from daemon.runtime.supervisor import Supervisor
@@ -25,7 +24,11 @@ from daemon.wires import make_wire
 from drivers.canopen.master import Master
 from drivers.contract import Drive
 from drivers.devices import Devices
+from drivers.simulated.bus import SimulatedPort
+from drivers.simulated.device_faults import Site
+from drivers.simulated.faults import Faults
 from drivers.simulated.workshop import Workshop
+from profiles.faults import PlacedFault
 from profiles.schema import Profile
 
 if TYPE_CHECKING:
@@ -60,6 +63,7 @@ class App:
         bus: the SPEC of :func:`daemon.wires.make_wire`.
         socket: path of the API's socket; None for a daemon without one (demo, tests).
         record: folder or file for a candump log; None for none.
+        record_bytes: what the logs of that folder may take.
         seed: of everything random in the simulated network.
         powered: whether the simulated nodes have power from the start.
         gateway: where other CANopen tools are served; None for nowhere.
@@ -67,6 +71,7 @@ class App:
         profile_file: where the profile stands, for commands that change it; None for nowhere.
         runs: where each motion leaves a run; None for nowhere.
         inherited: sockets that listen already, by their paths; the service manager has opened them and takes them away.
+        faults: that strike the simulated network; counted from its start.
     """
 
     def __init__(
@@ -76,6 +81,7 @@ class App:
         *,
         socket: Path | None = None,
         record: Path | None = None,
+        record_bytes: int = LIMIT_BYTES,
         seed: int = 0,
         powered: bool = True,
         gateway: GatewayAccess | None = None,
@@ -83,6 +89,7 @@ class App:
         built: Profile | None = None,
         profile_file: Path | None = None,
         runs: RunStore | None = None,
+        faults: Sequence[PlacedFault] = (),
     ) -> None:
         self.spec = bus
         self.wire = wire = make_wire(bus, profile, seed, built)
@@ -93,7 +100,7 @@ class App:
         self._powered = powered
         self._inherited = inherited or {}
         self._connecting: asyncio.Task[None] | None = None
-        self._record = record
+        self._record, self._record_bytes = record, record_bytes
         self.recorder: CandumpRecorder | None = None
         self.master = Master(self.bus, profile.network)
         self.devices = Devices(self.master, profile, wire.bricks)
@@ -105,12 +112,21 @@ class App:
             self.master, self.devices, period_s, self.supervisor.step, wire.pace, wire.reading_share, late
         )
         workshop = Workshop(built or profile, self.network) if self.network else None
-        commands = Commands(self.supervisor, self.network, workshop)
+        self.faults = self._make_faults(seed)
+        self._faults_to_set = faults
+        commands = Commands(self.supervisor, self.network, workshop, self.faults)
         self.service = Service(profile.name, self.supervisor, commands, self.bus, self.cycle, profile_file)
         self.service.runs = RunRecorder(runs, self.supervisor, self.bus, profile, bus) if runs else None
         self._localise(commands)
         self.server = self._serve(socket) if socket else None
         self.gateway = self._serve_tools(gateway) if gateway else None
+
+    def _make_faults(self, seed: int) -> Faults | None:
+        """What may go wrong in the simulated network."""
+        if self.network is None or self.medium is None:
+            return None
+        port = self.bus if isinstance(self.bus, SimulatedPort) else None
+        return Faults(Site(self.network, self.medium, port, self.wire.cable), seed)
 
     def _localise(self, commands: Commands) -> None:
         """Correct the vehicle's odometry by bearings, where its profile has reflectors."""
@@ -149,14 +165,18 @@ class App:
 
         Raises:
             Refused, ConfigError, PermissionRefused: a socket or the log cannot be opened.
+            UsageError: a fault cannot happen in this network.
         """
+        if self.faults is not None:
+            self.faults.load(self._faults_to_set)
         if self.server is not None:
             await self.server.start()
         if self.gateway is not None:
             await self.gateway.start()
         if self._record is not None:
-            virtual = isinstance(asyncio.get_running_loop(), VirtualTimeLoop)
-            self.recorder = CandumpRecorder(self.bus, self._record, self.profile.name, virtual=virtual)
+            self.recorder = CandumpRecorder(
+                self.bus, self._record, self.profile.name, self.supervisor.log, self._record_bytes
+            )
             self.recorder.start()
             self.service.recorder = self.recorder
         if self.service.runs is not None:
@@ -202,6 +222,8 @@ class App:
         self.cycle.stop()
         await self.devices.close()
         await self.master.close()
+        if self.faults is not None:
+            self.faults.close()
         if self.network is not None:
             await self.network.close()
         if self.server is not None:

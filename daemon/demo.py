@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from daemon.app import App
 from daemon.demo_robot import DemoRobot
 from daemon.loops.geometry import solve_turning
 from daemon.loops.odometry import least_squares
+from profiles.faults import PlacedFault
 from profiles.schema import PairedSteerGeometry, Profile
 
 
@@ -107,6 +108,7 @@ class Demo(DemoRobot):
         bus: ``simulated``, or ``rs232[@BAUD]`` for the same robot behind the serial line of its first drive.
         tell: called with a sentence at each step of the demo.
         watch: called once a control cycle, for a live view.
+        faults: that strike the robot.
     """
 
     def __init__(
@@ -117,10 +119,11 @@ class Demo(DemoRobot):
         tell: Callable[[str], None],
         watch: Callable[[App], None] | None = None,
         bus: str = "simulated",
+        faults: Sequence[PlacedFault] = (),
     ) -> None:
         if not isinstance(profile.vehicle, PairedSteerGeometry):
             raise UsageError(f"profile {profile.name} has no paired steering", remedy="the demo drives max2d")
-        super().__init__(profile, seed, record, tell, watch, bus)
+        super().__init__(profile, seed, record, tell, watch, bus, faults)
         self._geometry = profile.vehicle
         self._limits = self.app.profile.limits
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from canhelm.errors import Timeout
 from daemon.app import App
 from daemon.runtime.vehicle import VehicleState
 from drivers.simulated.body import BodyWorld
+from profiles.faults import PlacedFault
 from profiles.schema import Profile
 
 BOOT_DEADLINE_S = 20.0
@@ -25,6 +26,7 @@ class DemoRobot:
         tell: called with a sentence at each step of the demo.
         watch: called once a control cycle, for a live view.
         bus: ``simulated``, or ``rs232[@BAUD]`` for the same robot behind the serial line of its first drive.
+        faults: that strike it.
     """
 
     def __init__(
@@ -35,8 +37,9 @@ class DemoRobot:
         tell: Callable[[str], None],
         watch: Callable[[App], None] | None = None,
         bus: str = "simulated",
+        faults: Sequence[PlacedFault] = (),
     ) -> None:
-        self.app = app = App(profile, bus, seed=seed, record=record)
+        self.app = app = App(profile, bus, seed=seed, record=record, faults=faults)
         if watch is not None:
             app.supervisor.observers.append(lambda: watch(app))
         self.tell = tell

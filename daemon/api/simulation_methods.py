@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from daemon.api.parameters import Method, Param, Role
+from profiles.faults import KIND_NAMES
 
 _NODE = Param("node", "node", "node id, or name from the profile")
 
@@ -50,5 +51,40 @@ SIMULATION_METHODS = (
         (),
         "lifted, wheel_deg, heading_deg, brakes_engaged",
         Role.WATCH,
+    ),
+    Method(
+        "simulation.fault",
+        "Put a fault into the simulated network; which parameters a kind takes stands in docs/faults.md.",
+        (
+            Param("kind", "string", "what happens", choices=KIND_NAMES),
+            Param("part", "node", "drive, encoder, brake or brick that it happens to", default=None),
+            Param("cob_id", "integer", "frames of this identifier only", "", None, 0, 0x7FF),
+            Param("object", "string", "SDO transfers of this object only, as 0x6060 or 0x1018/2", default=None),
+            Param("at_s", "number", "when it begins, after now", "s", None, 0.0),
+            Param("at_frame", "integer", "with which frame it begins, the next one being 1", "", None, 1, 1e9),
+            Param("for_s", "number", "how long it lasts; until it is cleared where left out", "s", None, 0.0),
+            Param("nth", "integer", "only this one of the frames or requests that fit", "", None, 1, 1e9),
+            Param("probability", "number", "share that it strikes", "", None, 0.0, 1.0),
+            Param("times", "integer", "how many it strikes at most", "", None, 1, 1e9),
+            Param("delay_s", "number", "by how much frames come late", "s", None, 0.0),
+            Param("code", "integer", "EMCY code, or SDO abort code", "", None, 0, 0xFFFF_FFFF),
+            Param("value", "integer", "what an object says instead of the truth", "", None, 0, 0xFFFF_FFFF),
+            Param("angle_deg", "number", "of an encoder: of the motor shaft, or the steered axis", "deg", None),
+            Param("friction", "number", "coefficient of friction", "", None, 0.0, 2.0),
+        ),
+        "fault (its number), kind, state (waiting, acting, over), struck (how often), and what was asked for",
+    ),
+    Method(
+        "simulation.faults",
+        "The faults that were set, and how often each has struck.",
+        (),
+        "faults: each as simulation.fault returns it",
+        Role.WATCH,
+    ),
+    Method(
+        "simulation.clear_faults",
+        "Take away a fault of the simulated network, or all.",
+        (Param("fault", "integer", "number of the fault; all where left out", "", None, 1),),
+        "cleared (how many)",
     ),
 )

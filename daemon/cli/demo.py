@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from daemon.demo import Figure, FigureResult
     from daemon.demo_nxt import NxtResult
     from daemon.demo_turtle import TurtleResult
+    from profiles.faults import PlacedFault
     from profiles.schema import Profile
 
 NXT = "nxt"
@@ -39,6 +41,7 @@ def demo(
     out: Path | None = None,
     profile: str | None = None,
     bus: str = "simulated",
+    faults: Path | None = None,
     json: Json = None,
 ) -> int:
     """Boot a simulated robot and drive the manoeuvres that its designers published.
@@ -56,12 +59,16 @@ def demo(
         out: Folder for pictures and the candump log.
         profile: A robot like the figure's with simulation data; `max2d` or `turtle` without it.
         bus: `simulated`, or `rs232` (`rs232@38400`): the same robot behind the serial line of one of its drives.
+        faults: YAML file of faults that strike the MAX2D on its figures (docs/faults.md).
     """
     from daemon import demo_turtle
     from daemon.demo import FIGURES
     from daemon.runtime.clock import run_patient, run_virtual
+    from profiles.faults import load_faults
     from profiles.loader import load
 
+    if faults and figure not in (None, *(entry.identity for entry in FIGURES)):
+        raise UsageError("--faults is for the figures of the MAX2D", value=figure, remedy="leave out one of the two")
     run = DemoRun(seed, out, json, run_virtual if virtual_time else run_patient)
     if figure == NXT:
         return _nxt(load(profile or NXT).profile, run)
@@ -80,21 +87,24 @@ def demo(
         raise UsageError(
             f"the demo simulates its network, on {bus!r} it cannot", remedy="--bus simulated or --bus rs232"
         )
+    strikes = load_faults(faults, robot) if faults else ()
     run.begin()
     if turtle:
         return run.drive(
             [partial(demo_turtle.drive, robot, entry, seed, out, say) for entry in turtle], _turtle_table, _draw_turtle
         )
-    return _max2d(figures, robot, bus, run, every=100 if virtual_time else 10)
+    return _max2d(figures, robot, bus, run, strikes, every=100 if virtual_time else 10)
 
 
-def _max2d(figures: tuple[Figure, ...], robot: Profile, bus: str, run: DemoRun, every: int) -> int:
+def _max2d(
+    figures: tuple[Figure, ...], robot: Profile, bus: str, run: DemoRun, faults: Sequence[PlacedFault], every: int
+) -> int:
     from daemon.demo import Demo
 
     with DemoView(every) as view:
 
         async def drive() -> list[FigureResult]:
-            return await Demo(robot, run.seed, run.out, view.tell, view.watch, bus).run(figures)
+            return await Demo(robot, run.seed, run.out, view.tell, view.watch, bus, faults).run(figures)
 
         results: list[FigureResult] = run.runner(drive())
     run.show(results, _table, partial(_draw, robot))

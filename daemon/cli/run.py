@@ -34,12 +34,14 @@ def run(
     seed: int = 0,
     socket: Path | None = None,
     record: str | None = None,
+    record_mb: int = 1000,
     unpowered: Annotated[bool, Parameter(negative=())] = False,
     gateway: Path | None = None,
     gateway_tcp: int | None = None,
     gateway_write: Annotated[bool, Parameter(negative=())] = False,
     bit_rate: int | None = None,
     miswire: str | None = None,
+    faults: Path | None = None,
     runs: str | None = None,
     runs_mb: int = 200,
 ) -> int:
@@ -58,12 +60,14 @@ def run(
         seed: Seed of everything random in the simulated network.
         socket: Where to listen; the default is the robot's socket in the runtime folder.
         record: Folder or file for a candump log.
+        record_mb: What the logs of that folder may take; the oldest are deleted.
         unpowered: Simulated drives have no power until `canhelm sim power all on`.
         gateway: Where other CANopen tools connect (CiA 309-3); the default is beside the socket, as NAME.309.sock.
         gateway_tcp: Port on the loopback interface for such tools as well, to read only.
         gateway_write: Let them write objects and command network states through the gateway's socket, too.
         bit_rate: Bit/s of a bus without a profile; the default is 1000000.
         miswire: Profile of how the simulated robot is really built and wired, to find it out by `canhelm setup`.
+        faults: YAML file of faults that strike the simulated network (docs/faults.md).
         runs: Folder in which each motion leaves a run, or `off`; the default is the service's or the person's state
             folder (~/.local/state/canhelm/NAME/runs).
         runs_mb: What all runs may take; the oldest are deleted.
@@ -74,14 +78,16 @@ def run(
     from daemon.app import App, GatewayAccess
     from daemon.runtime.activation import inherited_sockets
     from daemon.runtime.clock import run_patient
+    from profiles.faults import load_faults
     from profiles.loader import load
 
     chosen = _bus(bus, simulate=simulate)
-    _refuse_senseless(chosen, unpowered=unpowered, record=record, virtual_time=virtual_time)
+    _refuse_senseless(chosen, unpowered=unpowered, record=record, record_mb=record_mb, virtual_time=virtual_time)
     loaded = load(profile) if profile else None
     robot = loaded.profile if loaded else _unknown(chosen, bit_rate)
-    if miswire and not simulates(chosen):
-        raise UsageError(f"--miswire is for simulated robots, and {chosen} is real", remedy="leave it out")
+    for option, wanted in (("--miswire", miswire), ("--faults", faults)):
+        if wanted and not simulates(chosen):
+            raise UsageError(f"{option} is for simulated robots, and {chosen} is real", remedy="leave it out")
     if profile and bit_rate is not None:
         raise UsageError("--bit-rate is for a bus without a profile", remedy="write network.bit_rate in the profile")
     for given in (socket, gateway):
@@ -95,6 +101,7 @@ def run(
         bus=chosen,
         socket=path,
         record=Path(record) if record else None,
+        record_bytes=record_mb * 1_000_000,
         seed=seed,
         powered=not unpowered,
         gateway=GatewayAccess(gateway or path.with_suffix(protocol.GATEWAY_SUFFIX), gateway_tcp, gateway_write),
@@ -102,6 +109,7 @@ def run(
         built=load(miswire).profile if miswire else None,
         runs=_store(runs, runs_mb, robot.name),
         profile_file=loaded.path.resolve() if loaded else None,
+        faults=load_faults(faults, robot) if faults else (),
     )
     runner: Callable[[Coroutine[Any, Any, str]], str] = run_patient if simulates(chosen) else asyncio.run
     say(runner(_live(make_app, profile, robot)))
@@ -160,7 +168,7 @@ async def _live(make_app: Callable[[Profile], App], source: str | None, robot: P
     return farewell
 
 
-def _refuse_senseless(bus: str, *, unpowered: bool, record: str | None, virtual_time: bool) -> None:
+def _refuse_senseless(bus: str, *, unpowered: bool, record: str | None, record_mb: int, virtual_time: bool) -> None:
     """Raise UsageError for options that make no sense, or not together."""
     if unpowered and not simulates(bus):
         raise UsageError(
@@ -168,6 +176,8 @@ def _refuse_senseless(bus: str, *, unpowered: bool, record: str | None, virtual_
         )
     if record == "":
         raise UsageError("--record is empty", remedy="name a folder or a file, as --record logs")
+    if record_mb < 1:
+        raise UsageError("--record-mb is below 1", value=record_mb, remedy="give megabytes, or leave --record out")
     if virtual_time:
         raise UsageError(
             "virtual time is for demos, campaigns and tests: clients of a socket live in real time",

@@ -8,8 +8,11 @@ from cyclopts import App, Parameter
 
 from daemon.cli.options import DEFAULT, Node, Options, node_of
 from daemon.cli.output import show
+from daemon.cli.sim_faults import fault, faults
 
 app = App(name="sim", help="Do things to the simulated network.")
+app.command(fault)
+app.command(faults)
 
 Input = Annotated[int, Parameter(help="Number of the digital input, 1 to 6.")]
 NodeOrAll = Annotated[str, Parameter(help="Node id (1 to 127), a name from the profile, or all.")]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import re
 import signal
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from canhelm.errors import UsageError
@@ -14,6 +16,7 @@ from daemon.cli.output import Json, say, show
 if TYPE_CHECKING:
     from drivers.simulated.network import SimulatedNetwork
     from drivers.simulated.serial_wire import SerialNoise
+    from profiles.faults import PlacedFault
     from profiles.schema import Profile
 
 DEFAULT_BAUD = 115200
@@ -32,6 +35,7 @@ def simulate(
     flip: float = 0.0,
     duplicate: float = 0.0,
     delay: float = 0.0,
+    faults: Path | None = None,
     json: Json = None,
 ) -> int:
     """Run a robot's simulated network, or some of its nodes beside real ones, until Ctrl-C or SIGTERM.
@@ -49,19 +53,23 @@ def simulate(
         flip: Share of which noise changes a bit.
         duplicate: Share that noise doubles.
         delay: Share that noise delays.
+        faults: YAML file of faults that strike the network (docs/faults.md).
     """
     from daemon.runtime.clock import run_precise
     from drivers.simulated.serial_wire import SerialNoise
+    from profiles.faults import load_faults
     from profiles.loader import load
 
     shares = (lose, flip, duplicate, delay)
     if not all(0.0 <= share <= 1.0 for share in shares):
         raise UsageError("a share of bytes is 0 to 1", value=shares, limit="0 to 1", remedy="give 0.01 for one in 100")
     robot = load(profile).profile
-    serial = _RS232.fullmatch(bus)
+    serial, wrong = _RS232.fullmatch(bus), load_faults(faults, robot) if faults else ()
     if serial:
         baud = int(serial[1] or DEFAULT_BAUD)
-        run_precise(_on_terminal(robot, nodes, gateway, baud, SerialNoise(*shares), seed, json))
+        run_precise(_on_terminal(robot, nodes, gateway, baud, SerialNoise(*shares), seed, wrong, json))
+    elif bus == "serial:pty" and faults:
+        raise UsageError("--faults is for a network, not for a brick alone", remedy="`canhelm run --simulate --faults`")
     elif bus == "serial:pty":
         run_precise(_brick_on_terminal(robot, seed, json))
     elif bus == "simulated" or bus.startswith("rs232") or ":" not in bus:
@@ -70,7 +78,7 @@ def simulate(
     elif gateway is not None or shares != _CLEAN:
         raise UsageError("a gateway and noise are for the serial line", remedy="give --bus rs232:pty")
     else:
-        run_precise(_on_interface(robot, nodes, bus, seed))
+        run_precise(_on_interface(robot, nodes, bus, seed, wrong))
     return 0
 
 
@@ -81,20 +89,26 @@ async def _on_terminal(
     baud: int,
     noise: SerialNoise,
     seed: int,
+    wrong: Sequence[PlacedFault],
     json: bool | None,
 ) -> None:
     from drivers.simulated.bus import SimulatedBus
+    from drivers.simulated.device_faults import Site
+    from drivers.simulated.faults import Faults
     from drivers.simulated.network import SimulatedNetwork
     from drivers.simulated.serial import SimulatedSerial
     from drivers.simulated.serial_wire import SerialPty
 
     ended = _ending()
-    network = SimulatedNetwork(profile, SimulatedBus(profile.network.bit_rate), seed)
+    medium = SimulatedBus(profile.network.bit_rate)
+    network = SimulatedNetwork(profile, medium, seed)
     name = _gateway(network, gateway)
     try:
         port = SimulatedSerial(network.drives[name], baud, noise=noise, seed=seed)
     except ValueError as error:
         raise UsageError(str(error), value=baud, remedy="give 9600, 14400, 19200, 38400, 57600 or 115200") from None
+    faults = Faults(Site(network, medium, cable=port.cable), seed)
+    faults.load(wrong)
     _power_on(network, nodes)
     if not network.drives[name].powered:
         raise UsageError(f"the gateway {name} has no power", value=nodes, remedy="add it to --nodes")
@@ -103,6 +117,7 @@ async def _on_terminal(
     show({"device": pty.device, "baud": baud, "gateway": name, "node": network.drives[name].node_id}, json=json)
     say(f"the network runs; drive it with `canhelm run --profile {profile.name} --bus {spec}`, end it with Ctrl-C")
     await ended.wait()
+    faults.close()
     pty.close()
     await network.close()
 
@@ -128,24 +143,31 @@ async def _brick_on_terminal(profile: Profile, seed: int, json: bool | None) -> 
     await twin.close()
 
 
-async def _on_interface(profile: Profile, nodes: str | None, spec: str, seed: int) -> None:
+async def _on_interface(
+    profile: Profile, nodes: str | None, spec: str, seed: int, wrong: Sequence[PlacedFault]
+) -> None:
     """Put the nodes onto a CAN interface; the time on the wire is the interface's."""
     from drivers.bus.interfaces import open_bus
     from drivers.simulated.bus import SimulatedBus
+    from drivers.simulated.device_faults import Site
+    from drivers.simulated.faults import Faults
     from drivers.simulated.network import SimulatedNetwork
 
     ended = _ending()
     medium = SimulatedBus(profile.network.bit_rate, instant=True)
     network = SimulatedNetwork(profile, medium, seed)
     near, far = medium.port("interface"), open_bus(spec, profile.network.bit_rate)
+    faults = Faults(Site(network, medium, near), seed)
     near.receiver = lambda can_id, data, _: far.send(can_id, data)
     far.receiver = lambda can_id, data, _: near.send(can_id, data)
     await far.open()
     try:
+        faults.load(wrong)
         _power_on(network, nodes)
         say(f"the network runs on {spec}; end it with Ctrl-C")
         await ended.wait()
     finally:
+        faults.close()
         await network.close()
         await far.close()
 

@@ -9,6 +9,7 @@ from daemon.runtime.brake_commands import BrakeCommands
 from daemon.runtime.brick_commands import BrickCommands
 from daemon.runtime.config_commands import ConfigCommands
 from daemon.runtime.encoder_commands import EncoderCommands
+from daemon.runtime.fault_commands import FaultCommands
 from daemon.runtime.frame_commands import FrameCommands
 from daemon.runtime.gamepad_commands import GamepadCommands
 from daemon.runtime.handlers import Handler, Params, holder, run_motion
@@ -21,6 +22,7 @@ from daemon.runtime.simulation_commands import Network, SimulationCommands
 from daemon.runtime.supervisor import Supervisor
 from daemon.runtime.workshop_commands import Workshop, WorkshopCommands
 from drivers.contract import DriveState
+from drivers.simulated.faults import Faults
 
 
 class Commands:
@@ -30,6 +32,7 @@ class Commands:
         supervisor: what decides.
         network: the simulated network; None where it is real.
         workshop: where the simulated robot stands; None where it is real.
+        faults: of the simulated network; None where it is real.
 
     Attributes:
         handlers: methods by name.
@@ -37,7 +40,11 @@ class Commands:
     """
 
     def __init__(
-        self, supervisor: Supervisor, network: Network | None = None, workshop: Workshop | None = None
+        self,
+        supervisor: Supervisor,
+        network: Network | None = None,
+        workshop: Workshop | None = None,
+        faults: Faults | None = None,
     ) -> None:
         self._supervisor = supervisor
         self.handlers: dict[str, Handler] = {
@@ -56,6 +63,7 @@ class Commands:
             **ConfigCommands(supervisor).handlers,
             **SimulationCommands(supervisor, network).handlers,
             **WorkshopCommands(workshop).handlers,
+            **FaultCommands(supervisor, faults).handlers,
             **GamepadCommands(supervisor.vehicle).handlers,
         }
         self.paths: PathCommands | None = None

@@ -130,6 +130,7 @@ class AckermannWorld(BodyWorld):
         x, y, yaw = start
         centre = (x - back * cos(yaw), y - back * sin(yaw), yaw)
         super().__init__({**drives, axle.drive: self.steering.drive}, vehicle.mass_kg, centre, step_s)
+        self.contacts = {name: wheel.contact for name, wheel in zip(vehicle.wheels, self.wheels, strict=False)}
         self._encoder = axle.encoder
         self._back_m = back
         self._wheelbase_m, self._half_track_m = vehicle.wheelbase_m, half

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from random import Random
 
 from profiles.sensors import SensorDefects
@@ -17,11 +18,13 @@ class SimulatedAngleSensor:
 
     Attributes:
         held_rad: where somebody holds its axis, as for a calibration; None: the vehicle turns it.
+        broken: what it says instead of an angle; None: it is whole.
     """
 
     def __init__(self, defects: SensorDefects, seed: str = "") -> None:
         self._defects = defects
         self.held_rad: float | None = None
+        self.broken: Callable[[float], float] | None = None
         self._play_rad = math.radians(defects.hysteresis_deg) / 2
         self._follower_rad = 0.0
         self._random = Random(seed)
@@ -32,5 +35,7 @@ class SimulatedAngleSensor:
         self._follower_rad = min(max(self._follower_rad, axis - self._play_rad), axis + self._play_rad)
         wave = math.radians(self._defects.nonlinearity_deg) * math.sin(2 * self._follower_rad)
         said = self._defects.gain * self._follower_rad + math.radians(self._defects.offset_deg) + wave
+        if self.broken is not None:
+            said = self.broken(said)
         noise_deg = self._defects.noise_deg
         return said + math.radians(self._random.gauss(0.0, noise_deg)) if noise_deg else said

@@ -54,6 +54,14 @@ class Braked(Protocol):
         ...
 
 
+class Footing(Protocol):
+    """Where a wheel touches the floor."""
+
+    def lay_ice(self, friction: float) -> None:
+        """From now on there is at most this friction; infinity takes the ice away."""
+        ...
+
+
 class BodyWorld(ABC):
     """A robot's body; a :class:`drivers.simulated.world.World` that also tells the truth to tests.
 
@@ -66,12 +74,14 @@ class BodyWorld(ABC):
     Attributes:
         lifted: whether it stands on blocks, its wheels in the air; only they move then.
         hands: how far hands still turn wheels that are in the air and without current [rad], by their drives.
+        contacts: where driven wheels touch the floor, by the names of their drives.
     """
 
     def __init__(
         self, drives: Mapping[str, WheelDrive], mass_kg: float, start: tuple[float, float, float], step_s: float
     ) -> None:
         self.axes: dict[str, Axis] = {name: drive.axis for name, drive in drives.items()}
+        self.contacts: Mapping[str, Footing] = {}
         self._drives = tuple(drives.values())
         self._braked: Mapping[str, Braked] = {}
         self.lifted = False
@@ -154,6 +164,11 @@ class BodyWorld(ABC):
                 self._steps_done = steps
                 return
             self._steps_done += 1
+
+    def block(self, drive: str, blocked: bool) -> None:
+        """Let something jam a motor from the last advanced time on, or take it away."""
+        self._drives[list(self.axes).index(drive)].block(blocked)
+        self._quiet_steps = 0
 
     def turn_by_hand(self, drive: str, angle_rad: float) -> None:
         """Turn a wheel in the air by hand, from the last advanced time on; positive as it rolls forward."""

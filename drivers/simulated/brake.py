@@ -18,11 +18,13 @@ class SimulatedBrake:
     Attributes:
         energised: current flows in the coil.
         engaged: what the brake does, after its times.
+        broken: what it does whatever its coil says: True where it does not open, False where it does not hold.
     """
 
     def __init__(self, config: BrakeConfig, act: Callable[[bool], None]) -> None:
         self.energised = False
         self.engaged = config.energise_to_release
+        self.broken: bool | None = None
         self._config = config
         self._act = act
         self._timer: asyncio.TimerHandle | None = None
@@ -34,9 +36,15 @@ class SimulatedBrake:
             self._timer.cancel()
             self._timer = None
         engage = energised is not self._config.energise_to_release
-        if engage is not self.engaged:
+        if engage is not self.engaged and self.broken is None:
             delay_s = self._config.close_time_s if engage else self._config.open_time_s
             self._timer = asyncio.get_running_loop().call_later(delay_s, self._moved, engage)
+
+    def wear_out(self, broken: bool | None) -> None:
+        """Be broken from now on, or mended (None): then the brake does at once what its coil says."""
+        self.close()
+        self.broken = broken
+        self._moved((self.energised is not self._config.energise_to_release) if broken is None else broken)
 
     def close(self) -> None:
         """Cancel a movement under way."""

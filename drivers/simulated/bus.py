@@ -81,6 +81,10 @@ class SimulatedPort(Bus):
         """Share of the last second that the wire was busy, 0 to 1."""
         return self._medium.load()
 
+    def remedy(self) -> str:
+        """What mends an interface that a fault has taken down."""
+        return "`canhelm sim faults` shows the fault, `canhelm sim fault clear` mends it"
+
     async def close(self) -> None:
         """Leave the bus; what is still queued is dropped."""
         self._medium.detach(self)
@@ -106,8 +110,10 @@ class SimulatedBus:
             sender repeats it after the error frame.
 
     Attributes:
-        frames: frames delivered, by identifier with flags.
+        frames: frames sent, by identifier with flags.
         error_frames: frames destroyed.
+        faults: asked for each frame, with identifier, data, sender and stamp: whether it arrives as it is; None: they
+            all do. Of one that does not, whoever is asked calls :meth:`deliver` as often as it shall arrive.
     """
 
     def __init__(
@@ -123,6 +129,7 @@ class SimulatedBus:
         self.name = name
         self.frames: defaultdict[int, int] = defaultdict(int)
         self.error_frames = 0
+        self.faults: Callable[[int, bytes, SimulatedPort, float], bool] | None = None
         self._disturbed = disturbed
         self._random = random.Random(seed)
         self._bit_s = 0.0 if instant else 1.0 / bit_rate
@@ -294,10 +301,14 @@ class SimulatedBus:
             return
         sender.counters.sent += 1
         self.frames[can_id] += 1
-        end_s = self._end_s
+        if self.faults is None or self.faults(can_id, data, sender, self._end_s):
+            self.deliver(can_id, data, sender, self._end_s)
+
+    def deliver(self, can_id: int, data: bytes, sender: SimulatedPort, end_s: float) -> None:
+        """Let a frame arrive at everybody but its sender, stamped with ``end_s``."""
         for port in self._ports:
             if port.taps and port.connected:
-                self._show_to_taps(port, can_id, data)
+                self._show_to_taps(port, can_id, data, end_s)
         route = self._routes.get(can_id)
         if route is None:
             route = self._routes[can_id] = self._find_route(can_id & ID_MASK)
@@ -311,10 +322,10 @@ class SimulatedBus:
             except Exception as error:  # noqa: BLE001 - one participant's mistake must not stop the wire
                 self._report(port, error)
 
-    def _show_to_taps(self, port: SimulatedPort, can_id: int, data: bytes) -> None:
+    def _show_to_taps(self, port: SimulatedPort, can_id: int, data: bytes, end_s: float) -> None:
         for tap in tuple(port.taps):
             try:
-                tap(can_id, data, self._end_s)
+                tap(can_id, data, end_s)
             except Exception as error:  # noqa: BLE001 - a listener's mistake must not stop the wire
                 self._report(port, error)
 

@@ -33,24 +33,23 @@ class Measurements:
         self.captured_qc = 0
         self.analog_mv: list[Callable[[], float]] = [lambda: 0.0, lambda: 0.0]
         self._motion = motion
-        self._axis = motion.axis
         self._pole_pairs = pole_pairs
         self._rad_s_per_rpm = rad_s_per_rpm
         self._random = Random(seed)
 
     def readers(self) -> dict[str, Callable[[], int]]:
         """Functions that compute the objects' values, by name."""
-        motion, axis = self._motion, self._axis
+        motion = self._motion
         return {
             "mode_of_operation_display": lambda: int(motion.mode),
             "position_actual_value": lambda: _int32(motion.counts),
             "position_demand_value": lambda: _int32(round(motion.qc_of(motion.profile.position))),
-            "velocity_actual_value": lambda: self._rpm(axis.speed_rad_s),
-            "velocity_actual_value_averaged": lambda: _int16(self._rpm(axis.speed_rad_s)),
+            "velocity_actual_value": lambda: self._rpm(motion.axis.speed_rad_s),
+            "velocity_actual_value_averaged": lambda: _int16(self._rpm(motion.axis.speed_rad_s)),
             "velocity_demand_value": lambda: self._rpm(motion.demand_speed),
-            "velocity_sensor_actual_value": lambda: round(axis.speed_rad_s * motion.qc_per_rad),
+            "velocity_sensor_actual_value": lambda: round(motion.axis.speed_rad_s * motion.qc_per_rad),
             "current_actual_value": self._current_ma,
-            "current_actual_value_averaged": lambda: _int16(1000.0 * axis.current_a),
+            "current_actual_value_averaged": lambda: _int16(1000.0 * motion.axis.current_a),
             "encoder_counter": lambda: motion.counts & 0xFFFF,
             "encoder_counter_at_index": self._counter_at_index,
             "hall_sensor_pattern": self._hall_pattern,
@@ -64,13 +63,13 @@ class Measurements:
         return round(speed_rad_s / self._rad_s_per_rpm())
 
     def _current_ma(self) -> int:
-        return _int16(1000.0 * self._axis.current_a + self._random.gauss(0.0, _CURRENT_NOISE_MA))
+        return _int16(1000.0 * self._motion.axis.current_a + self._random.gauss(0.0, _CURRENT_NOISE_MA))
 
     def _counter_at_index(self) -> int:
-        return floor(self._motion.qc_of(floor(self._axis.position_rad / tau) * tau)) & 0xFFFF
+        return floor(self._motion.qc_of(floor(self._motion.axis.position_rad / tau) * tau)) & 0xFFFF
 
     def _hall_pattern(self) -> int:
-        electrical = self._axis.position_rad * self._pole_pairs
+        electrical = self._motion.axis.position_rad * self._pole_pairs
         return _HALL_PATTERNS[floor(electrical / (pi / 3.0)) % 6]
 
 

@@ -60,6 +60,7 @@ class Max2dWorld(BodyWorld):
         """Wheels by the names of their drives, in the order rear right, rear left, front left, front right."""
         drives = {name: wheel.drive for name, wheel in self.wheels.items()}
         super().__init__(drives, vehicle.mass_kg, start, step_s)
+        self.contacts = {name: wheel.contact for name, wheel in self.wheels.items()}
         rear_right, rear_left, front_left, front_right = self.wheels.values()
         self._rear = Pair(vehicle, simulation, -1, rear_right, rear_left)
         self._front = Pair(vehicle, simulation, 1, front_right, front_left)

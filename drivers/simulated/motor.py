@@ -16,7 +16,7 @@ exactly, and starts only when something stronger than friction pulls.
 
 from __future__ import annotations
 
-from math import pi
+from math import inf, pi
 
 from drivers.simulated.world import Axis
 from profiles.schema import DriveConfig, SimulationConfig
@@ -33,6 +33,7 @@ class WheelDrive:
 
     __slots__ = (
         "_back_loss",
+        "_blocked",
         "_brake_n_m",
         "_dry_n_m",
         "_forward_loss",
@@ -69,7 +70,7 @@ class WheelDrive:
         self._friction_n_m = ratio * motor.torque_constant_n_m_a * motor.no_load_current_a
         self._brake_n_m = simulation.brake_holding_torque_n_m
         self._dry_n_m = self._friction_n_m
-        self.braked = False
+        self.braked = self._blocked = False
         self._rolling_m = simulation.tyre.rolling_resistance * config.wheel_radius_m
         self._forward_loss = 1.0 - config.gear_efficiency
         self._back_loss = 1.0 / config.gear_efficiency - 1.0
@@ -142,7 +143,16 @@ class WheelDrive:
     def set_brake(self, engaged: bool) -> None:
         """Engage or release a holding brake on the wheel."""
         self.braked = engaged
-        self._dry_n_m = self._friction_n_m + (self._brake_n_m if engaged else 0.0)
+        self._hold()
+
+    def block(self, blocked: bool) -> None:
+        """Let something jam the motor, so that nothing turns it, or take it away."""
+        self._blocked = blocked
+        self._hold()
+
+    def _hold(self) -> None:
+        braked_n_m = self._brake_n_m if self.braked else 0.0
+        self._dry_n_m = inf if self._blocked else self._friction_n_m + braked_n_m
 
     def stop(self) -> None:
         """Bring the wheel to rest at once."""

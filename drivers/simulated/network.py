@@ -101,8 +101,8 @@ class SimulatedNetwork:
             name: SimulatedEpos(
                 medium.port(name),
                 msgspec.structs.replace(config, node=FACTORY_NODE) if name in factory else config,
-                self._world_of(name).axes[name],
-                self._world_of(name),
+                self.world_of(name).axes[name],
+                self.world_of(name),
                 random.uniform(*_BOOT_DELAY_S),
                 random.getrandbits(32),
             )
@@ -137,7 +137,8 @@ class SimulatedNetwork:
         for drive in self.drives.values():
             drive.on_power_stage = self._on_power_stage
 
-    def _world_of(self, drive: str) -> BodyWorld:
+    def world_of(self, drive: str) -> BodyWorld:
+        """The physics that a drive belongs to."""
         return self.world if drive in self.world.axes else self.stand
 
     def _make_scanner(self, profile: Profile, seed: int) -> SimulatedScanner | None:
@@ -234,9 +235,13 @@ class SimulatedNetwork:
         if self._watch is None:
             self._watch = asyncio.get_running_loop().call_later(_WATCH_S, self._look)
 
-    def _look(self) -> None:
-        self._watch = None
+    def catch_up(self) -> None:
+        """Bring the physics up to this moment."""
         for world in (self.world, self.stand):
             world.advance(asyncio.get_running_loop().time())
+
+    def _look(self) -> None:
+        self._watch = None
+        self.catch_up()
         if self.world.moving or self.stand.moving or any(drive.motion.powered for drive in self.drives.values()):
             self._wake()

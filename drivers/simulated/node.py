@@ -62,6 +62,7 @@ class SimulatedNode:
     Attributes:
         nmt_state: BOOT_UP while it is off or starts.
         counters: frames that it could not use.
+        answer_sdo: its SDO server: what is answered to a request of 8 bytes, None for nothing.
     """
 
     def __init__(
@@ -87,6 +88,7 @@ class SimulatedNode:
         self.error_history: list[int] = []
         self._history_length = sum(index == 0x1003 and sub > 0 for index, sub in dictionary.objects)
         self._sdo = SdoServer(dictionary, BlockServer(dictionary, self._answer_sdo) if block_transfer else None)
+        self.answer_sdo: Callable[[bytes], bytes | None] = self._sdo.answer
         numbers = range(receive_pdos)
         self._rpdos = [ReceivePdo(dictionary, 0x1400 + n, 0x1600 + n, self._may_remap) for n in numbers]
         numbers = range(transmit_pdos)
@@ -137,7 +139,7 @@ class SimulatedNode:
         if not self.powered:
             self.powered = True
             self.port.connected = True
-            self._restart()
+            self.restart()
 
     def power_off(self) -> None:
         """Switch the node off at once: it is silent, and everything that was not saved is lost."""
@@ -146,7 +148,8 @@ class SimulatedNode:
             self._halt()
             self.port.connected = False
 
-    def _restart(self) -> None:
+    def restart(self) -> None:
+        """Start anew, as by NMT reset node or by the device's own watchdog."""
         self._halt()
         self.before_start(True)
         self.dictionary.restart()
@@ -273,7 +276,7 @@ class SimulatedNode:
             self.counters.malformed += 1
             return
         self.before_access(now_s)
-        answer = self._sdo.answer(data)
+        answer = self.answer_sdo(data)
         if answer is not None:
             self._answer_sdo(answer)
 
@@ -288,7 +291,7 @@ class SimulatedNode:
         if data[1] not in (0, self.node_id):
             return
         if command is NmtCommand.RESET_NODE:
-            self._restart()
+            self.restart()
         elif command is NmtCommand.RESET_COMMUNICATION:
             self.reset_communication()
         elif _STATES[command] is not self.nmt_state:

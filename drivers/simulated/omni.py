@@ -62,6 +62,7 @@ class OmniWorld(BodyWorld):
         drives = {name: wheel.drive for name, wheel in self.wheels.items()}
         super().__init__(drives, vehicle.mass_kg, start, step_s)
         _check_stiffness(profile, vehicle, simulation, step_s)
+        self.contacts = self.wheels
         self.floor = Floor(simulation.tyre.friction, simulation.floor)
         config, noise = profile.accelerometer, simulation.accelerometer_noise_m_s2
         self.accelerometer = SimulatedAccelerometer(config, noise, random.getrandbits(32)) if config else None

@@ -11,7 +11,7 @@ where ``k = C_x F_z / sigma``. Across it nothing but the rollers' rolling resist
 
 from __future__ import annotations
 
-from math import atan, cos, radians, sin
+from math import atan, cos, inf, radians, sin
 
 from drivers.simulated.motor import WheelDrive
 from drivers.simulated.tyre import DAMPING_S, SLOWEST_REFERENCE_M_S
@@ -40,6 +40,7 @@ class RollerWheel:
     __slots__ = (
         "_cos",
         "_deflection",
+        "_ice",
         "_lateral_m_s",
         "_per_friction_m",
         "_rim_m_s",
@@ -69,6 +70,11 @@ class RollerWheel:
         self.load_n = self.force_x_n = self.force_y_n = 0.0
         self._deflection = self._rim_m_s = self._lateral_m_s = self.slip_m_s = 0.0
         self.sliding = False
+        self._ice = inf
+
+    def lay_ice(self, friction: float) -> None:
+        """From now on there is at most this friction, whatever the floor has; infinity takes the ice away."""
+        self._ice = friction
 
     @property
     def slip_ratio(self) -> float:
@@ -90,6 +96,7 @@ class RollerWheel:
             friction: coefficient at the contact point.
             dt_s: length of the step.
         """
+        friction = min(friction, self._ice)
         point_x, point_y = vx - yaw_rate * self.y_m, vy + yaw_rate * self.x_m
         c, s = self._cos, self._sin
         lateral = point_y * c - point_x * s

@@ -111,6 +111,7 @@ class SemitrailerWorld(BodyWorld):
         self._bent_rad = 0.0
         self._trailer_rate = 0.0
         super().__init__(drives, vehicle.mass_kg, (self._back_m, 0.0, 0.0), step_s)
+        self.contacts = {vehicle.wheels[0]: self.rear.contact}
         self._geometry = vehicle
         self._stop_rad = radians(trailer.max_bending_deg)
         self._angles: Mapping[str, str] = {axle.encoder: "steering", trailer.encoder: "bending"}

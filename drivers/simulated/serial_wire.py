@@ -59,6 +59,7 @@ class SerialWire:
     Attributes:
         sent: bytes sent.
         disturbed: bytes that noise lost, changed, doubled or delayed.
+        noise: as given; another one may be set at any time.
     """
 
     def __init__(self, baud: int, deliver: Receiver, noise: SerialNoise, random: Random) -> None:
@@ -66,7 +67,7 @@ class SerialWire:
         self.disturbed = 0
         self._byte_s = BITS_PER_BYTE / baud
         self._deliver = deliver
-        self._noise = noise
+        self.noise = noise
         self._random = random
         self._free_s = 0.0
         self._queue: deque[tuple[float, bytes]] = deque()
@@ -76,7 +77,7 @@ class SerialWire:
         """Send bytes without a gap, from ``at_s`` or as soon as the wire is free; the time at which the last ends."""
         self.sent += len(data)
         self._free_s = max(at_s, self._free_s)
-        if self._noise == QUIET:
+        if self.noise == QUIET:
             self._put(data, len(data))
         else:
             for byte in data:
@@ -91,7 +92,7 @@ class SerialWire:
             self._timer = asyncio.get_running_loop().call_at(self._queue[0][0], self._on_end)
 
     def _send_disturbed(self, byte: int) -> None:
-        noise, happens = self._noise, self._random.random
+        noise, happens = self.noise, self._random.random
         lost, flipped = happens() < noise.lose, happens() < noise.flip
         doubled, delayed = happens() < noise.duplicate, happens() < noise.delay
         self.disturbed += lost or flipped or doubled or delayed

@@ -23,7 +23,7 @@ to any speed.
 
 from __future__ import annotations
 
-from math import atan, sqrt
+from math import atan, inf, sqrt
 
 from canhelm.errors import ConfigError
 from profiles.schema import Tyre
@@ -66,6 +66,8 @@ class Contact:
     __slots__ = (
         "_deflection_x",
         "_deflection_y",
+        "_friction",
+        "_ice",
         "_lateral_m_s",
         "_limit_m",
         "_rim_m_s",
@@ -81,6 +83,7 @@ class Contact:
         stiffness = tyre.cornering_stiffness_per_rad / tyre.relaxation_length_m
         self._stiffness = stiffness
         self._limit_m = 0.0
+        self._ice = inf
         self.stand_on(tyre.friction)
         self._roll_out_x = stiffness / tyre.slip_stiffness
         self._roll_out_y = stiffness / tyre.cornering_stiffness_per_rad
@@ -92,7 +95,13 @@ class Contact:
 
     def stand_on(self, friction: float) -> None:
         """From now on the floor has this coefficient of friction."""
-        self._limit_m = 3.0 * friction / self._stiffness
+        self._friction = friction
+        self._limit_m = 3.0 * min(friction, self._ice) / self._stiffness
+
+    def lay_ice(self, friction: float) -> None:
+        """From now on there is at most this friction, whatever the floor has; infinity takes the ice away."""
+        self._ice = friction
+        self.stand_on(self._friction)
 
     @property
     def slip_ratio(self) -> float:

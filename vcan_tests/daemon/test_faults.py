@@ -1,0 +1,297 @@
+"""A whole simulated robot and each kind of fault: what the daemon sees, says and does, and what gets it going again."""
+
+from __future__ import annotations
+
+import asyncio
+from math import degrees
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from canhelm.errors import CanhelmError, DeviceFault, Refused, UsageError
+from daemon.app import App
+from drivers.simulated.max2d import Max2dWorld
+from profiles.faults import load_faults
+from profiles.loader import load
+from vcan_tests.daemon.nxt_twin import NXT
+from vcan_tests.robot import Robot, running_robot
+
+MAX2D = load("max2d").profile
+REST_S = 1.5
+"""From a fault at 0.4 m/s until every wheel stands: noticing it, and the quick-stop ramp, with a margin."""
+
+
+def _begin(robot: Robot, method: str, **params: Any) -> asyncio.Task[Any]:
+    """A command of a client that takes its answer, error or not, for what it is."""
+
+    async def ask() -> dict[str, Any] | CanhelmError:
+        try:
+            return await robot.call(method, **params)
+        except CanhelmError as error:
+            return error
+
+    return asyncio.create_task(ask())
+
+
+async def _driving(robot: Robot) -> asyncio.Task[Any]:
+    driving = _begin(robot, "drive.parallel", angle_deg=0.0, speed_m_s=0.4, duration_s=2.0)
+    await robot.until(lambda: robot.speed_m_s > 0.38)
+    return driving
+
+
+STOPS: list[tuple[dict[str, Any], str]] = [
+    ({"kind": "lose", "part": "front_left"}, "node 3 (front_left) is silent"),
+    ({"kind": "lose", "cob_id": 0x080}, "no node answers"),
+    ({"kind": "lose", "cob_id": 0x703}, "node 3 (front_left) is lost: no guarding answer"),
+    ({"kind": "delay", "cob_id": 0x183, "delay_s": 0.2}, "node 3 (front_left) is silent"),
+    ({"kind": "pdo_short", "cob_id": 0x183}, "node 3 (front_left) is silent"),
+    ({"kind": "pdo_short", "part": "front"}, "node 6 (front) is silent"),
+    ({"kind": "pdo_long", "part": "front"}, "node 6 (front) is silent"),
+    ({"kind": "node_reset", "part": "front_left"}, "node 3 (front_left)"),
+    ({"kind": "node_reset", "part": "front"}, "node 6 (front)"),
+    ({"kind": "power_cycle", "part": "front_left"}, "node 3 (front_left)"),
+    ({"kind": "silence", "part": "front_left"}, "node 3 (front_left) is silent"),
+    ({"kind": "silence", "part": "front"}, "node 6 (front) is silent"),
+    ({"kind": "babbling", "part": "front_left"}, "no node answers"),
+    ({"kind": "emcy", "part": "front_left", "code": 0x4210}, "node 3 (front_left) reports over-temperature"),
+    ({"kind": "emcy", "part": "front_left", "code": 0x1234}, "node 3 (front_left) reports emergency 0x1234"),
+    ({"kind": "emcy", "part": "front", "code": 0x5000}, "node 6 (front) reports position error"),
+    ({"kind": "bus_off"}, "vcan0 does not work: its controller is bus-off"),
+    ({"kind": "unplugged"}, "vcan0 does not work: the adapter is unplugged"),
+]
+
+
+@pytest.mark.parametrize(("fault", "told"), STOPS, ids=[" ".join(map(str, fault.values())) for fault, _ in STOPS])
+async def test_a_fault_while_driving_stops_the_robot_by_name_and_a_reset_gets_it_going(
+    fault: dict[str, Any], told: str
+) -> None:
+    async with running_robot(expect_errors=True) as robot:
+        driving = await _driving(robot)
+        await robot.call("simulation.fault", **fault)
+        await robot.until(lambda: robot.state == "fault", 0.5)
+        await robot.until(lambda: robot.fastest_wheel_m_s < 0.01, REST_S)
+        error = await driving
+        assert isinstance(error, DeviceFault)
+        assert told in error.message
+        assert error.remedy
+        assert (await robot.call("simulation.faults"))["faults"][0]["struck"] > 0
+        await robot.call("simulation.clear_faults")
+        await robot.until(lambda: all(device.node_state == "ready" for device in robot.app.devices.all))
+        assert (await robot.call("reset"))["state"] == "idle"
+        await robot.call("drive.parallel", angle_deg=0.0, speed_m_s=0.2, duration_s=0.3)
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        {"kind": "delay", "delay_s": 0.002},
+        {"kind": "duplicate"},
+        {"kind": "reorder", "probability": 0.2},
+        {"kind": "lose", "probability": 0.005},
+        {"kind": "encoder_noise", "part": "front_left", "angle_deg": 0.2},
+    ],
+    ids=lambda fault: fault["kind"],
+)
+async def test_a_robot_drives_on_where_a_fault_is_small(fault: dict[str, Any]) -> None:
+    async with running_robot(expect_errors=True) as robot:
+        driving = await _driving(robot)
+        await robot.call("simulation.fault", **fault)
+        assert "motion" in await driving
+        assert (await robot.call("simulation.faults"))["faults"][0]["struck"] > 0
+        assert robot.fastest_wheel_m_s < 0.01
+
+
+@pytest.mark.parametrize(
+    ("fault", "told"),
+    [
+        (
+            {"kind": "sdo_abort", "object": "0x6060", "code": 0x06090030},
+            "0x6060 (mode_of_operation): value out of range",
+        ),
+        ({"kind": "sdo_abort"}, "refused access to 0x1000 (device_type): general error (0x08000000)"),
+        ({"kind": "sdo_timeout", "object": "0x1018/1"}, "checking its identity"),
+        ({"kind": "wrong_identity"}, "another kind of device stands on this one"),
+        ({"kind": "wrong_identity", "object": "0x1018/1", "value": 7}, "0x1018/1 (vendor_id)"),
+        ({"kind": "power_cycle", "for_s": 3.0}, "no boot-up; is motor power on?"),
+    ],
+    ids=["abort", "abort of all", "time-out", "device type", "vendor", "power"],
+)
+async def test_a_fault_at_boot_is_told_with_its_node_and_mended_when_it_is_gone(
+    fault: dict[str, Any], told: str
+) -> None:
+    async with running_robot(booted=False, expect_errors=True) as robot:
+        await robot.call("simulation.fault", part="front_left", **fault)
+        await robot.until(lambda: told in str(robot.app.service.status()), 5.0)
+        assert "node 3 (front_left)" in robot.app.service.status()["message"]
+        assert robot.state in ("waiting", "booting")
+        await robot.call("simulation.clear_faults")
+        await robot.until(lambda: robot.state == "idle", 5.0)
+
+
+async def test_a_drive_whose_temperature_stays_high_is_not_reset_until_it_has_cooled_down() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        await robot.call("simulation.fault", kind="emcy", part="front_left", code=0x4210, for_s=2.0)
+        await robot.until(lambda: robot.state == "fault")
+        with pytest.raises(DeviceFault, match="over-temperature"):
+            await robot.call("reset")
+        await asyncio.sleep(2.0)
+        assert (await robot.call("reset"))["state"] == "idle"
+
+
+# Steering: what the robot's encoders, brakes and motors do to it
+
+
+async def _steered(robot: Robot, fault: dict[str, Any]) -> tuple[Any, float]:
+    """What steering the front pair to 30 degrees comes to, and its true heading then."""
+    await robot.call("simulation.fault", **fault)
+    answer = await _begin(robot, "steer", pair="front", angle_deg=30.0)
+    return answer, degrees(robot.network.world.heading_rad("front"))
+
+
+@pytest.mark.parametrize("fault", ["encoder_stuck", "encoder_reversed"])
+async def test_a_pair_whose_encoder_does_not_tell_its_heading_is_stopped_by_name(fault: str) -> None:
+    async with running_robot(expect_errors=True) as robot:
+        answer, _ = await _steered(robot, {"kind": fault, "part": "front"})
+        assert isinstance(answer, CanhelmError)
+        assert "front" in answer.message
+        await robot.until(lambda: robot.fastest_wheel_m_s < 0.01, REST_S)
+
+
+async def test_an_encoder_that_jumps_leads_a_pair_astray_by_so_much() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        await robot.call("steer", pair="front", angle_deg=10.0)
+        await robot.call("simulation.fault", kind="encoder_jump", part="front", angle_deg=8.0)
+        await asyncio.sleep(0.1)
+        told_deg = robot.app.devices.encoders["front"].heading_rad
+        assert degrees(told_deg - robot.network.world.heading_rad("front")) == pytest.approx(8.0, abs=0.1)
+
+
+async def test_a_brake_that_does_not_open_keeps_its_pair_where_it_is() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        answer, heading_deg = await _steered(robot, {"kind": "brake_stuck", "part": "front"})
+        assert isinstance(answer, DeviceFault)
+        assert "front: the pair does not turn" in answer.message
+        assert "brake" in answer.message
+        assert heading_deg == pytest.approx(0.0, abs=0.1)
+
+
+async def test_a_brake_that_does_not_hold_lets_its_pair_be_pushed_until_it_is_mended() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        await robot.call("simulation.fault", kind="brake_slips", part="front")
+        assert (await robot.call("simulation.hand", name="front", angle_deg=5.0))["turned_deg"] == 5.0
+        await robot.call("simulation.clear_faults")
+        assert (await robot.call("simulation.hand", name="front", angle_deg=5.0))["turned_deg"] == 0.0
+
+
+async def test_a_blocked_motor_does_not_turn_whatever_its_drive_does() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        await robot.call("simulation.fault", kind="motor_blocked", part="front_left")
+        driving = _begin(robot, "motor.velocity", node=3, velocity_rpm=500.0, duration_s=1.0)
+        await robot.until(lambda: robot.app.devices.drives["front_left"].current_a > 1.0)
+        assert robot.network.world.axes["front_left"].speed_rad_s == 0.0
+        await driving
+
+
+async def test_a_wheel_on_ice_slips() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        world = robot.network.world
+        assert isinstance(world, Max2dWorld)
+        await robot.call("simulation.fault", kind="ice", part="front_left")
+        driving = _begin(robot, "drive.parallel", angle_deg=0.0, speed_m_s=0.4, duration_s=0.5)
+        slips: list[tuple[float, ...]] = []
+        robot.app.supervisor.observers.append(lambda: slips.append(tuple(map(abs, world.slip_m_s))))
+        await driving
+        worst = dict(zip(world.wheels, map(max, zip(*slips, strict=True)), strict=True))
+        assert max(worst, key=worst.__getitem__) == "front_left"
+
+
+@pytest.mark.parametrize("kind", ["encoder_stuck", "encoder_jump"])
+async def test_a_motor_with_a_broken_encoder_is_whole_again_when_the_fault_is_cleared(kind: str) -> None:
+    async with running_robot(expect_errors=True) as robot:
+        angle = {"angle_deg": 90.0} if kind == "encoder_jump" else {}
+        drive, axis = robot.network.drives["front_left"], robot.network.world.axes["front_left"]
+        await robot.call("simulation.lift", lifted=True)
+        await robot.call("simulation.fault", kind=kind, part="front_left", **angle)
+        before_rad = axis.position_rad
+        assert drive.motion.axis is not axis
+        await _begin(robot, "motor.velocity", node=3, velocity_rpm=100.0, duration_s=0.3)
+        assert abs(axis.position_rad - before_rad) > 0.1
+        await robot.call("simulation.clear_faults")
+        assert drive.motion.axis is axis
+        await asyncio.sleep(0.5)
+        result = await robot.call("motor.velocity", node=3, velocity_rpm=100.0, duration_s=0.5)
+        assert result
+
+
+# Serial lines and bricks
+
+
+@pytest.mark.parametrize("fault", [{"kind": "serial_noise", "probability": 0.05}, {"kind": "unplugged"}])
+async def test_a_serial_line_that_fails_stops_the_robot(fault: dict[str, Any]) -> None:
+    async with running_robot(bus="rs232", expect_errors=True) as robot:
+        driving = _begin(robot, "drive.parallel", angle_deg=0.0, speed_m_s=0.2, duration_s=20.0)
+        await robot.until(lambda: robot.speed_m_s > 0.15)
+        await robot.call("simulation.fault", **fault)
+        error = await driving
+        assert isinstance(error, DeviceFault)
+        assert error.remedy
+        await robot.until(lambda: robot.fastest_wheel_m_s < 0.01, 10.0)
+
+
+async def test_a_brick_out_of_range_is_told_and_comes_back() -> None:
+    async with running_robot(NXT, expect_errors=True) as robot:
+        await robot.call("simulation.fault", kind="brick_lost", part="nxt", for_s=2.0)
+        await robot.until(lambda: robot.state == "waiting", 2.0)
+        assert "nxt" in robot.app.service.status()["message"]
+        await robot.until(lambda: robot.state == "idle")
+
+
+# What is refused
+
+
+@pytest.mark.parametrize(
+    ("fault", "told"),
+    [
+        ({"kind": "serial_noise", "probability": 0.1}, "no simulated serial line"),
+        ({"kind": "silence", "part": "left"}, "none of the drives and encoders"),
+        ({"kind": "delay"}, "delay_s is missing"),
+        ({"kind": "lose", "for_s": 0.0}, "for_s"),
+        ({"kind": "wrong_identity", "part": 3, "object": "0x9999"}, "front_left has no object 0x9999"),
+    ],
+)
+async def test_a_fault_that_cannot_happen_is_refused_with_a_remedy(fault: dict[str, Any], told: str) -> None:
+    async with running_robot() as robot:
+        with pytest.raises(UsageError, match=told) as caught:
+            await robot.call("simulation.fault", **fault)
+        assert caught.value.remedy
+        assert (await robot.call("simulation.faults"))["faults"] == []
+
+
+async def test_a_real_robot_has_no_faults_to_set() -> None:
+    app = App(MAX2D, "virtual:nobody")
+    with pytest.raises(Refused, match="this robot is real"):
+        await app.service.call("simulation.faults", {}, app.service.open_lease("test"))
+
+
+# Files
+
+
+async def test_the_faults_of_a_file_are_counted_from_the_robots_start(tmp_path: Path) -> None:
+    file = tmp_path / "faults.yaml"
+    file.write_text("faults:\n- {kind: emcy, part: front_left, code: 0x4210, at_s: 2.5}\n")
+    app = App(MAX2D, faults=load_faults(file, MAX2D))
+    begun_s = asyncio.get_running_loop().time()
+    await app.start()
+    took_s = await Robot(app).until(lambda: app.service.state == "fault")
+    assert asyncio.get_running_loop().time() - begun_s == took_s == pytest.approx(2.5, abs=0.05)
+    await app.close()
+
+
+async def test_a_fault_of_a_file_that_cannot_happen_here_is_told_with_its_line(tmp_path: Path) -> None:
+    file = tmp_path / "faults.yaml"
+    file.write_text("faults:\n- kind: lose\n- kind: serial_noise\n  probability: 0.1\n")
+    app = App(MAX2D, faults=load_faults(file, MAX2D))
+    with pytest.raises(UsageError, match=r"faults.yaml:3: there is no simulated serial line"):
+        await app.start()
+    await app.close()
