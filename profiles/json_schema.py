@@ -12,10 +12,10 @@ from typing import Any
 
 import msgspec
 
-from profiles import bricks, gamepad, localisation, own_vehicle, schema, sensors, steered
+from profiles import bricks, gamepad, localisation, own_vehicle, plausibility, schema, sensors, steered
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-_MODULES = (schema, bricks, steered, sensors, gamepad, localisation, own_vehicle)
+_MODULES = (schema, bricks, steered, sensors, gamepad, localisation, own_vehicle, plausibility)
 """Where the schema's classes stand."""
 _NAME = {"type": "string"}
 EXTENDS = {

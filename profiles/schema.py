@@ -19,6 +19,7 @@ from profiles.gamepad import GamepadConfig
 from profiles.localisation import LocalisationConfig, SimulatedScannerConfig
 from profiles.own_vehicle import OwnGeometry
 from profiles.parts import Name, NotNegative, Part, Positive
+from profiles.plausibility import PlausibilityConfig
 from profiles.sensors import AngleCalibration, SensorDefects
 from profiles.steered import CarGeometry, SemitrailerGeometry
 
@@ -373,6 +374,7 @@ class Profile(Part, frozen=True, kw_only=True):
     """None: the pose is that of the odometry alone."""
     traction: TractionConfig | None = None
     """None: slip of the wheels is not answered."""
+    plausibility: PlausibilityConfig = PlausibilityConfig()
     simulation: SimulationConfig | None = None
 
     @property

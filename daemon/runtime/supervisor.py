@@ -17,6 +17,7 @@ from daemon.loops.measurement import Command, Measurement
 from daemon.runtime.events import EventLog
 from daemon.runtime.leases import Leases
 from daemon.runtime.motions import Motion
+from daemon.runtime.plausibility import Plausibility
 from daemon.runtime.stopping import MOTION, Stopping
 from daemon.runtime.tasks import TaskSet
 from daemon.runtime.vehicle import Vehicle, VehicleState
@@ -66,6 +67,7 @@ class Supervisor:
         self._numbers = itertools.count(1)
         self._tasks = TaskSet(self._on_task_failure)
         self._watch = DeviceWatch(devices, period_s, master.bus, master.network.late_after_cycles)
+        self._plausibility = Plausibility(vehicle)
         self._stopping = stopping = Stopping(devices, vehicle, self.motions, self._tasks, self.log, self._drop_targets)
         self.stop, self.estop, self.fault = stopping.stop, stopping.estop, stopping.fault
         self.power_off, self.until_rest = stopping.power_off, stopping.until_rest
@@ -209,6 +211,7 @@ class Supervisor:
         self._stopping.rest.look((*measurement.wheel_speed_m_s, *[drive.speed_m_s for drive in self.vehicle.aside]))
         self._watch_leases(now_s)
         self._watch_devices(now_s)
+        self._watch_readings(measurement)
         wanted = self._ask_motions(measurement, dt_s)
         self.command, self.active_limits = self.vehicle.gate(wanted, measurement, self.command, dt_s)
         if self.command.release_brake:
@@ -250,6 +253,11 @@ class Supervisor:
             fault = self._watch.look(now_s, powered=self.powered)
             if fault is not None:
                 self.fault(fault)
+
+    def _watch_readings(self, measurement: Measurement) -> None:
+        fault = self._plausibility.look(measurement, powered=self.powered and not self._stopping.latched)
+        if fault is not None:
+            self.fault(fault)
 
     def _on_node_event(self, event: NodeEvent) -> None:
         self.log.add(event.severity, event.name or f"node {event.node}", event.message, event.remedy)

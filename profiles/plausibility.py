@@ -1,0 +1,12 @@
+"""What a profile says of readings that contradict each other: how far they may, before the vehicle is stopped."""
+
+from __future__ import annotations
+
+from profiles.parts import Part, Positive
+
+
+class PlausibilityConfig(Part, frozen=True, kw_only=True):
+    """Limits of the checks while driving (docs/plausibility.md); what is left out is derived from the vehicle."""
+
+    encoder_jump_deg: Positive | None = None
+    """Between two readings of an encoder, beyond twice the way at its axis' fastest turning; None: 1 and two counts."""
