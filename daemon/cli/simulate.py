@@ -144,7 +144,7 @@ async def _brick_on_terminal(profile: Profile, seed: int, json: bool | None) -> 
 
 
 async def _on_interface(
-    profile: Profile, nodes: str | None, spec: str, seed: int, wrong: Sequence[PlacedFault]
+    profile: Profile, nodes: str | None, spec: str, seed: int, wrong: Sequence[PlacedFault] = ()
 ) -> None:
     """Put the nodes onto a CAN interface; the time on the wire is the interface's."""
     from drivers.bus.interfaces import open_bus
