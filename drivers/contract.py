@@ -130,6 +130,10 @@ class Drive(Device, Protocol):
         """Command the quick stop at once, outside the cycle (RPDO3), and set the target to zero."""
         ...
 
+    async def insist_on_stop(self) -> None:
+        """See that the drive takes its quick stop; tell it by other means where it does not, and raise DeviceFault."""
+        ...
+
     async def enable(self) -> None:
         """Write a zero target, take the drive to Operation Enabled in its driving mode, and return when it is there."""
         ...

@@ -54,7 +54,7 @@ class Stopping:
         self.estop_reason = ""
         self.cause: DeviceFault | None = None
         self.closing = False
-        self.brakes = BrakeKeeper(devices, vehicle.brakes, tasks, self._on_brake_failure)
+        self.brakes = BrakeKeeper(devices, vehicle.brakes, tasks, self._on_failure)
         self.rest = RestWatch()
         self._devices = devices
         self._drives = tuple(devices.drives.values())
@@ -124,6 +124,7 @@ class Stopping:
         self._halt(Refused(f"the motion was stopped: {reason}"))
         self._halting += 1
         try:
+            await self._insist()
             await self._settled()
             if not self.latched:
                 for drive in self._drives:
@@ -204,12 +205,23 @@ class Stopping:
     async def _stop_and_disable(self) -> None:
         self._halting += 1
         try:
+            await self._insist()
             await self._settled()
             for drive in self._drives:
                 if drive.node_state is NodeState.READY and drive.state not in POWERLESS:
                     await self._try(drive.name, self.power_off(drive))
         finally:
             self._halting -= 1
+
+    async def _insist(self) -> None:
+        """See that every drive takes the quick stop; one that needs more than its PDOs for it is a fault."""
+        ready = [drive for drive in self._drives if drive.node_state is NodeState.READY]
+        answers = await asyncio.gather(*(drive.insist_on_stop() for drive in ready), return_exceptions=True)
+        for answer in answers:
+            if isinstance(answer, DeviceFault):
+                self._on_failure(answer)
+            elif isinstance(answer, BaseException) and not isinstance(answer, CanhelmError):
+                raise answer
 
     # --- rest and power ----------------------------------------------------------------------------------------
 
@@ -224,9 +236,16 @@ class Stopping:
         return tuple(drive for drive in self._drives if drive.state not in OFF or abs(drive.speed_m_s) > AT_REST_M_S)
 
     async def power_off(self, drive: Drive) -> None:
-        """Engage what holds the axis, then switch the drive off. Raises NotReady or Timeout."""
+        """Engage what holds the axis, then switch the drive off; one that needs more than its PDOs for it is a fault.
+
+        Raises:
+            NotReady: the drive is not ready.
+        """
         await self.brakes.secure(drive.name)
-        await drive.disable()
+        try:
+            await drive.disable()
+        except DeviceFault as error:
+            self._on_failure(error)
 
     async def _settled(self) -> None:
         await self.until_rest()
@@ -246,8 +265,8 @@ class Stopping:
                 "is the vehicle on a slope, or a wheel pushed by hand?",
             )
 
-    def _on_brake_failure(self, error: DeviceFault) -> None:
-        """A fault, unless one has stopped the vehicle already: its stop switches the brakes once more."""
+    def _on_failure(self, error: DeviceFault) -> None:
+        """A fault, unless one has stopped the vehicle already: that stop goes on."""
         if not self.latched:
             self.fault(error)
         else:

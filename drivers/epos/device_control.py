@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from canhelm.errors import DeviceFault, Timeout
+from canhelm.errors import Aborted, DeviceFault, NodeAbsent, Timeout
+from drivers.canopen.codes import NmtCommand
 from drivers.contract import DriveState
 from drivers.epos.configure import ZERO_TARGETS
 from drivers.epos.objects import OBJECTS
@@ -60,6 +61,47 @@ async def walk_to(drive: EposDrive, target: State, command: Commander) -> None:
 
 async def _leave(drive: EposDrive, state: State | None, target: State) -> None:
     await drive.waiters.reach(lambda statusword: state_of(statusword) is not state, target.words, target)
+
+
+async def insist_on_stop(drive: EposDrive, within_s: float) -> None:
+    """See that a drive takes its quick stop; one that does not is told once more, by SDO.
+
+    Args:
+        within_s: time in which its statusword has to show that PDOs have reached it.
+
+    Raises:
+        DeviceFault: it had to be told by SDO.
+        NodeAbsent, Timeout, Aborted: it cannot be told by SDO either.
+    """
+    if drive.state is not DriveState.ENABLED:
+        return
+    try:
+        await drive.waiters.reach(lambda word: drive_state(word) is not DriveState.ENABLED, "a stop", within_s=within_s)
+    except Timeout:
+        await drive.write((OBJECTS["controlword"], Command.QUICK_STOP))
+        raise _deaf(drive, "was stopped by SDO") from None
+
+
+async def switch_off_otherwise(drive: EposDrive) -> None:
+    """Switch off a drive that does not do so by PDO: by SDO; where that fails, too, its node is restarted.
+
+    Raises:
+        DeviceFault: always, as something is wrong with a drive that needs this.
+    """
+    try:
+        await drive.write((OBJECTS["controlword"], Command.DISABLE_VOLTAGE))
+        state = state_of(await drive.sdo.read_int(OBJECTS["statusword"]))
+    except (Aborted, NodeAbsent, Timeout):
+        state = None
+    if state is None or state.power_stage_on:
+        drive.master.send_nmt(NmtCommand.RESET_NODE, drive.node)
+        raise _deaf(drive, "was switched off by restarting its node")
+    raise _deaf(drive, "was switched off by SDO")
+
+
+def _deaf(drive: EposDrive, what: str) -> DeviceFault:
+    remedy = f"look at its PDOs: `canhelm config diff {drive.name}`, `canhelm nmt reset {drive.name}`"
+    return DeviceFault(f"{drive.who} does not follow its PDOs and {what}", node=drive.node, remedy=remedy)
 
 
 async def reset_fault(drive: EposDrive, command: Commander) -> None:

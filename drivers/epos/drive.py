@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from canhelm.errors import CanhelmError, DeviceFault, NotReady, Refused
+from canhelm.errors import CanhelmError, DeviceFault, NotReady, Refused, Timeout
 from drivers.canopen.device import CanopenDevice, Step
 from drivers.canopen.master import Master
 from drivers.canopen.objects import ObjectDef
@@ -28,6 +28,8 @@ from profiles.schema import DriveConfig
 
 SENSOR_ERROR = 0x7320
 """Also sent when a setting of the sensor is changed (Firmware Specification 14.1.46): no fault while one configures."""
+INSIST_CYCLES = 5
+"""Cycles in which a drive has to show that it takes a quick stop."""
 _unpack_tpdo1, _pack_rpdo1 = TPDO1.unpack, RPDO1.pack
 
 
@@ -200,18 +202,23 @@ class EposDrive(CanopenDevice):
                 raise
 
     async def disable(self) -> None:
-        """Switch the power stage off and return when it is off; the axis then coasts. Raises NotReady or Timeout."""
+        """Switch the power stage off and return when it is off; the axis then coasts.
+
+        Raises:
+            NotReady: the node is not ready.
+            DeviceFault: it did not follow its PDOs, and was switched off by other means.
+        """
         self.require_ready()
         self._interrupt(Refused(f"{self.who} was disabled in the meantime", node=self.node))
         self._drop_target()
         self._command(Command.DISABLE_VOLTAGE)
         off = (DriveState.DISABLED, DriveState.FAULT)
         if self.state not in off:
-            await self.waiters.reach(
-                lambda statusword: drive_state(statusword) in off,
-                "power stage off",
-                State.SWITCH_ON_DISABLED,
-            )
+            wanted = "power stage off"
+            try:
+                await self.waiters.reach(lambda word: drive_state(word) in off, wanted, State.SWITCH_ON_DISABLED)
+            except Timeout:
+                await device_control.switch_off_otherwise(self)
 
     def quick_stop(self) -> None:
         """Command the quick stop by RPDO3 and RPDO1; a drive that is off is just kept from being enabled."""
@@ -222,6 +229,10 @@ class EposDrive(CanopenDevice):
             soon_s = asyncio.get_running_loop().time() + self._stale_s
             self._send(self._rpdo3, make_rpdo3(Command.QUICK_STOP, self.mode), soon_s)
             self.transmit(soon_s)
+
+    async def insist_on_stop(self) -> None:
+        """See :func:`drivers.epos.device_control.insist_on_stop`."""
+        await device_control.insist_on_stop(self, INSIST_CYCLES * self._stale_s)
 
     async def reset_fault(self) -> None:
         """Clear a fault by a rising edge of the fault reset bit.

@@ -84,16 +84,19 @@ class StatuswordWaiters:
             if not waiter.done():
                 waiter.set_exception(error)
 
-    async def reach(self, done: Callable[[int], bool], wanted: str, target: State | None = None) -> None:
+    async def reach(
+        self, done: Callable[[int], bool], wanted: str, target: State | None = None, within_s: float = TRANSITION_S
+    ) -> None:
         """Wait for a statusword.
 
         Args:
             done: judges each statusword that comes.
             wanted: what is waited for, for the message.
             target: the state on the way to which the drive is, to name the bits that differ.
+            within_s: time in which it has to come.
 
         Raises:
-            Timeout: it did not come within :data:`TRANSITION_S`.
+            Timeout: it did not come in that time.
             CanhelmError: what :meth:`interrupt` was called with.
         """
         loop = asyncio.get_running_loop()
@@ -101,15 +104,15 @@ class StatuswordWaiters:
         begun_s = loop.time()
         self._waiters.append(entry)
         try:
-            async with asyncio.timeout(TRANSITION_S):
+            async with asyncio.timeout(within_s):
                 await entry[1]
         except TimeoutError:
-            raise self._not_reached(wanted, target, silent=self._last_s <= begun_s) from None
+            raise self._not_reached(wanted, target, within_s, silent=self._last_s <= begun_s) from None
         finally:
             self._waiters.remove(entry)
 
-    def _not_reached(self, wanted: str, target: State | None, silent: bool) -> Timeout:
-        message = f"{self._who} did not reach {wanted} within {TRANSITION_S:g} s: "
+    def _not_reached(self, wanted: str, target: State | None, within_s: float, *, silent: bool) -> Timeout:
+        message = f"{self._who} did not reach {wanted} within {within_s:g} s: "
         remedy = "reset and try again; `canhelm explain` tells the bits of a statusword"
         if silent:
             message += "no reading came from it"

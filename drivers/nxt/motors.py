@@ -115,6 +115,9 @@ class NxtDrive:
         self.target_speed_m_s = 0.0
         self.brick.stop(port=self.output)
 
+    async def insist_on_stop(self) -> None:
+        """Nothing to do: the brick acknowledges what it was told."""
+
     async def enable(self) -> None:
         """Let it be driven. Raises NodeAbsent, NotReady (as with a battery that is too low)."""
         self.brick.require_ready()

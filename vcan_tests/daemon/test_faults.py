@@ -82,6 +82,48 @@ async def test_a_fault_while_driving_stops_the_robot_by_name_and_a_reset_gets_it
         await robot.call("drive.parallel", angle_deg=0.0, speed_m_s=0.2, duration_s=0.3)
 
 
+@pytest.mark.parametrize("command", ["stop", "estop"])
+@pytest.mark.parametrize(
+    "fault", [{"kind": "lose", "cob_id": 0x203}, {"kind": "pdo_long", "part": "front_left"}], ids=["lost", "too long"]
+)
+async def test_a_drive_that_gets_no_pdos_is_stopped_and_switched_off_by_sdo(
+    fault: dict[str, Any], command: str
+) -> None:
+    async with running_robot(expect_errors=True) as robot:
+        driving = await _driving(robot)
+        await robot.call("simulation.fault", **fault)
+        await robot.call("simulation.fault", kind="lose", cob_id=0x403)
+        _begin(robot, command)
+        await robot.until(lambda: robot.fastest_wheel_m_s < 0.01, REST_S)
+        await driving
+        await robot.until(lambda: not robot.network.drives["front_left"].motion.powered, 4.0)
+        told = [event["message"] for event in robot.app.supervisor.log.events]
+        assert [words for words in told if words.startswith("node 3 (front_left) does not follow its PDOs")]
+        assert robot.state == ("estop" if command == "estop" else "fault")
+
+
+async def test_a_motion_whose_drive_gets_no_pdos_ends_in_a_fault_with_the_drive_off() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        driving = await _driving(robot)
+        await robot.call("simulation.fault", kind="lose", cob_id=0x203)
+        await driving
+        assert robot.state == "fault"
+        assert "does not follow its PDOs" in robot.app.service.status()["message"]
+        assert not robot.network.drives["front_left"].motion.powered
+        await robot.until(lambda: robot.fastest_wheel_m_s < 0.01, REST_S)
+
+
+async def test_a_drive_that_can_be_told_nothing_is_switched_off_by_restarting_its_node() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        await robot.call("motor.enable", node=3)
+        await robot.call("simulation.fault", kind="lose", cob_id=0x203)
+        await robot.call("simulation.fault", kind="sdo_abort", part="front_left")
+        await _begin(robot, "motor.disable", node=3)
+        await robot.until(lambda: not robot.network.drives["front_left"].motion.powered, 0.1)
+        told = [event["message"] for event in robot.app.supervisor.log.events]
+        assert "node 3 (front_left) does not follow its PDOs and was switched off by restarting its node" in told
+
+
 @pytest.mark.parametrize(
     "fault",
     [
