@@ -10,3 +10,5 @@ class PlausibilityConfig(Part, frozen=True, kw_only=True):
 
     encoder_jump_deg: Positive | None = None
     """Between two readings of an encoder, beyond twice the way at its axis' fastest turning; None: 1 and two counts."""
+    encoder_off_deg: Positive | None = None
+    """Between what an encoder and the wheels of its axis have turned, beyond 30 % of that; None: as much as a jump."""

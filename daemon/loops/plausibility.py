@@ -9,10 +9,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Final
 
 TURNING_ALLOWANCE: Final = 2.0
 """An encoder may turn so many times as fast as its axis is ever commanded: ramps overshoot."""
+
+WHEELS_SHARE: Final = 0.3
+"""Of what wheels turn an axis, what an encoder may miss: slip of the tyres, gain of a sensor without calibration."""
+STANDING_SHARE: Final = 0.2
+"""An encoder that tells less than this of the turning stands."""
+WINDOW: Final = 6.0
+"""Limits that an axis turns by before a comparison begins anew."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,3 +80,77 @@ class EncoderJumps:
             if not abs(angle - before) <= limit:
                 return Contradiction(index, math.fabs(angle - before), limit)
         return None
+
+
+class Turning(StrEnum):
+    """How an axis turns otherwise than its wheels turn it."""
+
+    STANDS = "stands"
+    AGAINST = "against"
+    OFF = "off"
+
+
+@dataclass(frozen=True, slots=True)
+class SteeredBy:
+    """What turns the axis of an encoder.
+
+    Attributes:
+        encoder: its index.
+        wheels: index of each drive that turns it, and by how much for its way [rad/m].
+        brake: index of the brake that has to be released for it; None for an axis without.
+    """
+
+    encoder: int
+    wheels: tuple[tuple[int, float], ...]
+    brake: int | None = None
+
+    def angle(self, ways_m: Sequence[float]) -> float:
+        """Angle for ways of the drives; rate for their speeds."""
+        return sum(ways_m[index] * per_metre for index, per_metre in self.wheels)
+
+
+class AxisTurning:
+    """One axis that wheels or a drive turn: whether its encoder follows them, and both the command.
+
+    Compared is what has turned since a common beginning, which is moved up after some way.
+
+    Args:
+        limit_rad: what encoder and wheels may differ by, beside a share of the way.
+    """
+
+    def __init__(self, limit_rad: float) -> None:
+        self._limit_rad = limit_rad
+        self._begin: tuple[float, float] | None = None
+        self._commanded_rad = 0.0
+
+    def begin_anew(self) -> None:
+        """Compare what turns from now on."""
+        self._begin = None
+
+    def look(self, heading_rad: float, driven_rad: float, commanded_rad: float) -> tuple[Turning, float, float] | None:
+        """What contradicts, how far and beyond which limit [rad]; or None.
+
+        Args:
+            heading_rad: by the encoder.
+            driven_rad: by what the wheels have rolled.
+            commanded_rad: turning that was commanded since the last look.
+        """
+        if self._begin is None:
+            self._begin, self._commanded_rad = (heading_rad, driven_rad), 0.0
+            return None
+        self._commanded_rad += commanded_rad
+        said, driven = heading_rad - self._begin[0], driven_rad - self._begin[1]
+        limit, off = self._limit_rad + WHEELS_SHARE * abs(driven), abs(said - driven)
+        if not off <= limit:
+            return _how(said, driven), off, limit
+        if said * self._commanded_rad < 0 and abs(said) > limit:
+            return Turning.AGAINST, abs(said), limit
+        if abs(driven) > WINDOW * self._limit_rad:
+            self.begin_anew()
+        return None
+
+
+def _how(said: float, driven: float) -> Turning:
+    if abs(said) < STANDING_SHARE * abs(driven):
+        return Turning.STANDS
+    return Turning.AGAINST if said * driven < 0 else Turning.OFF

@@ -211,7 +211,7 @@ class Supervisor:
         self._stopping.rest.look((*measurement.wheel_speed_m_s, *[drive.speed_m_s for drive in self.vehicle.aside]))
         self._watch_leases(now_s)
         self._watch_devices(now_s)
-        self._watch_readings(measurement)
+        self._watch_readings(measurement, dt_s)
         wanted = self._ask_motions(measurement, dt_s)
         self.command, self.active_limits = self.vehicle.gate(wanted, measurement, self.command, dt_s)
         if self.command.release_brake:
@@ -254,8 +254,10 @@ class Supervisor:
             if fault is not None:
                 self.fault(fault)
 
-    def _watch_readings(self, measurement: Measurement) -> None:
-        fault = self._plausibility.look(measurement, powered=self.powered and not self._stopping.latched)
+    def _watch_readings(self, measurement: Measurement, dt_s: float) -> None:
+        powered = self.powered and not self._stopping.latched
+        driving = any(motion.kind in self.vehicle.methods for motion in self.motions.values())
+        fault = self._plausibility.look(measurement, self.command, dt_s, powered=powered, driving=driving)
         if fault is not None:
             self.fault(fault)
 
@@ -284,9 +286,16 @@ class Supervisor:
         self.leases.renew(lease)
 
     def close_lease(self, lease: str, reason: str = "its client hung up") -> None:
-        """The client is gone, or lets go: its motions stop."""
+        """The client is gone: its motions stop."""
         self.release_motions(lease, reason)
         self.leases.close(lease)
+
+    async def end_lease(self, lease: str, reason: str) -> None:
+        """The client lets go: its motions stop; returns when they have ended, streamed ones among them."""
+        held = [motion for motion in self.motions.values() if motion.lease == lease]
+        self.close_lease(lease, reason)
+        for motion in held:
+            await motion.closed.wait()
 
     @property
     def lease_timeout_s(self) -> float:
