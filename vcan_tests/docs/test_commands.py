@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
 
-from vcan_tests.docs.pages import Block, Command, blocks, written
-from vcan_tests.docs.playground import Answer, Playground, parse, without_comment
+from vcan_tests.docs.pages import Command, blocks, written
+from vcan_tests.docs.player import Answer, Player, parse, without_comment
 
-QUESTION = re.compile(r"\[y/N\] (\w+)")
 NUMBER = re.compile(r"\d+(\.\d+)?")
 AGREED = Path(__file__).with_name("not_carried_out.txt")
 """Commands that need hardware, root, a person or much time; each page says which, in a comment before them."""
 
 
 @pytest.fixture
-def playground(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Playground]:
-    playground = Playground(tmp_path, monkeypatch)
-    yield playground
-    playground.close()
-
-
-def console_blocks(page: str) -> list[Block]:
-    return [block for block in blocks(written()[page]) if block.language == "console" or block.file]
+def player(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Player]:
+    player = Player(tmp_path, monkeypatch)
+    yield player
+    player.close()
 
 
 PLAYED = ("docs/first-week.md",)
@@ -34,42 +29,29 @@ PAGES = [page for page, text in written().items() if page not in PLAYED and "```
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_the_commands_of_a_page_do_what_it_says(playground: Playground, tmp_path: Path, page: str) -> None:
-    for block in console_blocks(page):
-        if block.file:
-            (tmp_path / block.file).write_text(block.text, encoding="utf-8")
-            continue
-        for line in block.before.splitlines():
-            answer = playground.run(line)
-            assert answer.code == 0, f"{page}:{block.line}: before it: {line}: {answer.err}"
-        if not block.needs:
-            for command in block.commands():
-                check(page, command, playground.run(command.text, typed(command)))
-
-
-def typed(command: Command) -> str:
-    """What the page shows a person to answer to questions."""
-    return "".join(f"{answer}\n" for answer in QUESTION.findall("\n".join(command.shown)))
+def test_the_commands_of_a_page_do_what_it_says(player: Player, page: str) -> None:
+    for command, answer in player.plays(written()[page]):
+        check(page, command, answer)
 
 
 def check(page: str, command: Command, answer: Answer) -> None:
     """A command that fails, fails as the page says; what the page shows is what the command says, but for numbers."""
     where = f"{page}:{command.line}: {command.text}"
-    told = masked(answer.out + answer.err)
+    told = masked(answer.shown)
     if answer.code != 0:
-        assert masked(answer.err).strip() in masked("\n".join(command.shown)), f"{where}: {answer}"
+        assert masked([answer.err]) in masked(command.shown), f"{where}: {answer}"
     for line in command.shown:
-        assert masked(QUESTION.sub("[y/N]", line)).strip(". ") in told, f"{where}: does not say {line!r}, but {answer}"
+        assert masked([line]).strip(". ") in told, f"{where}: does not say {line!r}, but {answer}"
 
 
-def masked(text: str) -> str:
+def masked(lines: Sequence[str]) -> str:
     """Text without its numbers, the widths of its columns, and where its lines end."""
-    return " ".join(NUMBER.sub("0", text).split())
+    return " ".join(NUMBER.sub("0", "\n".join(lines)).split())
 
 
 def not_carried_out() -> list[str]:
     """Every command that no test carries out, with the reason that its page gives."""
-    marked = [(page, block) for page in PAGES for block in console_blocks(page) if block.needs]
+    marked = [(page, block) for page in PAGES for block in blocks(written()[page]) if block.needs]
     return [
         f"{page}: {without_comment(command.text)} ({block.needs})"
         for page, block in marked

@@ -11,7 +11,7 @@ import pytest
 
 from profiles.loader import load
 from profiles.schema import Profile
-from vcan_tests.docs.typed import Typist, fits, played
+from vcan_tests.docs.player import Player, fits, told_anew
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "first-week.md"
 pytestmark = pytest.mark.timeout(600)
@@ -39,20 +39,20 @@ def week(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Week]:
     """Monday to Friday, on virtual time."""
     folder = tmp_path_factory.mktemp("week")
     with pytest.MonkeyPatch.context() as patch:
-        typist = Typist(folder, patch)
+        player = Player(folder, patch)
         try:
-            told = played(PAGE.read_text(encoding="utf-8"), typist)
-            assert typist.daemon is not None
-            network = typist.daemon.app.network
+            told = told_anew(PAGE.read_text(encoding="utf-8"), player)
+            assert player.daemon is not None
+            network = player.daemon.app.network
             assert network is not None
             pose = network.world.pose
         finally:
-            typist.close()
+            player.close()
         yield Week(told, pose, load(folder / "lab1.yaml").profile, load(folder / "built.yaml").profile)
 
 
 def test_the_page_shows_what_its_commands_say(week: Week) -> None:
-    anew = "`python -m vcan_tests.docs.typed docs/first-week.md` writes down what they say now"
+    anew = "`python -m vcan_tests.docs.player docs/first-week.md` writes down what they say now"
     assert week.told.splitlines() == PAGE.read_text(encoding="utf-8").splitlines(), anew
 
 
@@ -97,4 +97,4 @@ def test_the_robot_has_driven_figure_4_7_within_two_percent(week: Week) -> None:
     ],
 )
 def test_dots_on_a_page_stand_for_lines(shown: list[str], told: list[str], agrees: bool) -> None:
-    assert fits(shown, told) is agrees
+    assert fits(tuple(shown), told) is agrees
