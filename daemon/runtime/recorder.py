@@ -3,84 +3,93 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import logging
 import time
-from io import FileIO
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from canhelm.errors import ConfigError
+from daemon.runtime.clock import VirtualTimeLoop
+from daemon.runtime.disk import Disk
+from daemon.runtime.events import EventLog
+from daemon.runtime.log_files import LogFiles
 from drivers.bus.candump import make_line
 from drivers.bus.contract import Bus
 
-LOGGER = logging.getLogger("canhelm.recorder")
-
-FLUSH_PERIOD_S = 1.0
-PENDING_LIMIT_BYTES = 4_000_000
+WRITE_PERIOD_S = 0.1
+"""What the end of the process by a signal that nobody can catch may cost."""
+RETRY_PERIOD_S = 1.0
+LIMIT_BYTES = 1_000_000_000
+"""What all logs of a folder may take, unless told otherwise."""
 
 
 class CandumpRecorder:
-    """Writes every frame of a bus to a candump log, at least once a second and when it is closed.
+    """Writes every frame of a bus to a candump log: ten times a second, by a thread, and when it is closed.
 
-    A disk that is full or fails does not stop anything: it is said once, what could not be written is kept up to
-    4 MB and tried again, and only frames beyond that are lost and counted.
+    A disk that is full, fails or is slow stops nothing else: it is an event, what could not be written is kept up to
+    4 MB and tried again once a second, and only frames beyond that are lost and counted.
+
+    On virtual time times count from zero, so that two runs with one seed write the same bytes; otherwise they are those
+    of the wall clock.
 
     Args:
         bus: the interface to listen to.
-        path: the log (``*.log``), which must not exist yet, or a folder, which gets a new
-            ``candump-<robot>-<n>.log``; it is made where only it is missing, not the one around it.
+        path: file or folder, as :class:`daemon.runtime.log_files.LogFiles` takes it.
         robot: the robot's name.
-        virtual: whether the loop runs on virtual time. Then times count from zero, so that two runs with one seed
-            write the same bytes; otherwise they are those of the wall clock.
+        events: where a disk that fails is told.
+        limit_bytes: what the logs of a folder may take.
 
     Attributes:
-        path: the log itself, once it is started.
-        frames: frames recorded.
-        lost: frames that never reached the log because the disk failed for too long.
+        frames: frames seen.
         errors: attempts to write that failed.
     """
 
-    def __init__(self, bus: Bus, path: Path, robot: str, *, virtual: bool = False) -> None:
-        self.path = path
+    def __init__(self, bus: Bus, path: Path, robot: str, events: EventLog, limit_bytes: int = LIMIT_BYTES) -> None:
         self.frames = 0
-        self.lost = 0
         self.errors = 0
+        self._loop = asyncio.get_running_loop()
+        virtual = isinstance(self._loop, VirtualTimeLoop)
+        self._epoch_s = 0.0 if virtual else time.time() - self._loop.time()
+        self._files = LogFiles(path, robot, limit_bytes, sync=not virtual)
         self._bus = bus
-        self._robot = robot
-        self._virtual = virtual
-        self._epoch_s = 0.0
-        self._file: FileIO | None = None
+        self._events = events
+        self._lost = 0
+        self._disk: Disk | None = None
         self._pending = bytearray()
         self._timer: asyncio.TimerHandle | None = None
         self._failing = False
 
+    @property
+    def path(self) -> Path:
+        """The log that is written to now, once it is started."""
+        return self._files.path
+
+    @property
+    def lost(self) -> int:
+        """Frames that never reached a log because the disk failed, or was busy, for too long."""
+        return self._lost + self._files.lost
+
     def start(self) -> None:
         """Create the log and record from now on. Raises ConfigError where it cannot be created."""
-        self._loop = asyncio.get_running_loop()
-        if not self._virtual:
-            self._epoch_s = time.time() - self._loop.time()
         try:
-            self._file = self._create()
+            self._files.open()
         except OSError as error:
             raise ConfigError(
                 f"cannot create the log {self.path}: {error.strerror}",
                 remedy="name a folder that this user may write to, or a new file",
             ) from error
+        self._disk = Disk(self._on_failure)
         self._bus.taps.append(self._record)
 
     def close(self) -> None:
         """Write what is left and end the log; a recorder that was never started has nothing to do."""
-        if self._file is None:
+        if self._disk is None:
             return
         self._bus.taps.remove(self._record)
-        self._flush()
-        self.lost += self._pending.count(b"\n")
-        try:
-            self._file.close()
-        except OSError as error:
-            self._fail(error)
-        self._file = None
+        self._write()
+        self._disk.do(self._files.close)
+        self._disk.close()
+        self._disk = None
 
     def status(self) -> dict[str, Any]:
         """The log for ``status``."""
@@ -92,45 +101,28 @@ class CandumpRecorder:
             "errors": self.errors,
         }
 
-    def _create(self) -> FileIO:
-        if self.path.suffix == ".log":
-            return FileIO(self.path, "x")
-        folder, number = self.path, 0
-        folder.mkdir(exist_ok=True)
-        while True:
-            number += 1
-            self.path = folder / f"candump-{self._robot}-{number}.log"
-            with contextlib.suppress(FileExistsError):
-                return FileIO(self.path, "x")
-
     def _record(self, can_id: int, data: bytes, timestamp_s: float) -> None:
-        pending = self._pending
-        if len(pending) > PENDING_LIMIT_BYTES:
-            self.lost += 1
-            return
         self.frames += 1
-        pending += f"{make_line(self._epoch_s + timestamp_s, self._bus.name, can_id, data)}\n".encode()
+        self._pending += f"{make_line(self._epoch_s + timestamp_s, self._bus.name, can_id, data)}\n".encode()
         if self._timer is None:
-            self._timer = self._loop.call_later(FLUSH_PERIOD_S, self._flush)
+            period_s = RETRY_PERIOD_S if self._failing else WRITE_PERIOD_S
+            self._timer = self._loop.call_later(period_s, self._write)
 
-    def _flush(self) -> None:
+    def _write(self) -> None:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
-        assert self._file is not None
-        try:
-            while self._pending:
-                del self._pending[: self._file.write(self._pending)]
+        assert self._disk is not None
+        lines, self._pending = bytes(self._pending), bytearray()
+        if not self._disk.do(partial(self._files.write, lines, self._loop.time()), len(lines)):
+            self._lost += lines.count(b"\n")
+        if self._failing and not self._files.failing:
             self._failing = False
-        except OSError as error:
-            self._fail(error)
+            self._events.add("info", "recording", f"goes on in {self.path}; {self.lost} frames are missing in all")
 
-    def _fail(self, error: OSError) -> None:
+    def _on_failure(self, error: OSError) -> None:
         self.errors += 1
         if not self._failing:
             self._failing = True
-            LOGGER.error(
-                "cannot write to the log %s: %s (make room on the disk: recording goes on by itself)",
-                self.path,
-                error.strerror,
-            )
+            told = f"cannot write to the log {self.path}: {error.strerror}"
+            self._events.add("error", "recording", told, "make room on the disk: recording goes on by itself")

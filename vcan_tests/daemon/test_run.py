@@ -112,6 +112,11 @@ def test_an_empty_record_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> N
     assert "--record is empty" in capsys.readouterr().err
 
 
+def test_a_recording_without_any_room_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*SIMULATED, "--record", "logs", "--record-mb", "0"]) == 2
+    assert "--record-mb is below 1" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

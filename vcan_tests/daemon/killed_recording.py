@@ -1,0 +1,100 @@
+"""What ``kill -9`` takes from a recording: ``python -m vcan_tests.daemon.killed_recording`` does it ten times.
+
+A daemon with a simulated MAX2D, its control cycle at 100 Hz, records its bus; it is killed right after it has told how
+many frames it has seen. Those that are missing in the log were lost.
+"""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from canhelm.client import Client
+from canhelm.errors import CanhelmError
+from drivers.bus.candump import LogFrame, parse_line
+
+PROFILE = """
+schema_version: 1
+name: max2d
+extends: robots/max2d
+network: {cycle_hz: 100, guard_time_ms: 1000, life_time_factor: 4}
+"""
+TIMEOUT_S = 120.0
+FRAMES = 500
+"""Seen at least before it is killed."""
+TIMES = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Killed:
+    """One recording that was cut off.
+
+    Attributes:
+        seen: frames that the daemon has told of.
+        frames: those in the log.
+        unreadable: lines of the log that are none.
+    """
+
+    seen: int
+    frames: list[LogFrame]
+    unreadable: int
+
+    @property
+    def lost(self) -> int:
+        """Frames seen and not in the log; none where more were written than the daemon had told of."""
+        return max(0, self.seen - len(self.frames))
+
+    @property
+    def lost_s(self) -> float:
+        """How much of the bus's time that is, at the log's own rate of frames."""
+        return self.lost * (self.frames[-1].timestamp_s - self.frames[0].timestamp_s) / (len(self.frames) - 1)
+
+
+def kill_while_recording(folder: Path) -> Killed:
+    """Start a daemon that records into a folder, and kill it in the midst."""
+    profile, socket, logs = folder / "max2d.yaml", folder / "robot.sock", folder / "logs"
+    profile.write_text(PROFILE)
+    arguments = ["--profile", str(profile), "--socket", str(socket), "--record", str(logs), "--runs", "off"]
+    daemon = subprocess.Popen(
+        [sys.executable, "-m", "daemon", "run", "--simulate", *arguments], stderr=subprocess.DEVNULL
+    )
+    try:
+        with _connected(socket) as client:
+            while (seen := client.status()["recording"]["frames"]) < FRAMES:
+                continue
+            daemon.send_signal(signal.SIGKILL)
+    finally:
+        daemon.kill()
+        daemon.wait()
+    lines = "".join(log.read_text(encoding="ascii") for log in sorted(logs.iterdir())).splitlines()
+    frames = [frame for line in lines if (frame := parse_line(line))]
+    return Killed(seen, frames, len(lines) - len(frames))
+
+
+def _connected(socket: Path) -> Client:
+    deadline = time.monotonic() + TIMEOUT_S
+    while True:
+        try:
+            return Client(str(socket))
+        except CanhelmError:
+            if time.monotonic() > deadline:
+                raise
+
+
+def main() -> None:
+    """Print a line for each time."""
+    print("frames seen  in the log  unreadable  lost frames  lost ms")
+    for _ in range(TIMES):
+        with TemporaryDirectory() as folder:
+            killed = kill_while_recording(Path(folder))
+        counts = f"{killed.seen:11}  {len(killed.frames):10}  {killed.unreadable:10}  {killed.lost:11}"
+        print(f"{counts}  {killed.lost_s * 1e3:7.1f}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
