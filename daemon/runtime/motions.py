@@ -8,12 +8,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Awaitable, Callable
 from typing import Any, TypeVar
 
-from canhelm.errors import CanhelmError, Refused
+from canhelm.errors import CanhelmError, DeviceFault, Refused
 from daemon.loops.measurement import Command, Measurement
 from daemon.runtime.streams import Streamed
 from drivers.contract import Drive, DriveState
 
 T = TypeVar("T")
+REST_WITHIN_S = 5.0
+"""Time in which a wheel has to come to rest after zero was commanded; ramps need less."""
 
 
 class Motion(ABC):
@@ -114,7 +116,38 @@ def _observe(future: asyncio.Future[dict[str, Any]]) -> None:
         future.exception()
 
 
-class WheelVelocity(Motion):
+class DriveVelocity(Motion):
+    """What motions of one drive at a speed have in common: their end.
+
+    Args:
+        drive: the drive.
+        duration_s: time from the begin after which it ends; None: until stopped.
+    """
+
+    AT_REST_M_S = 0.01
+
+    def __init__(self, kind: str, drive: Drive, duration_s: float | None, lease: str | None) -> None:
+        super().__init__(kind, (drive.name,), lease)
+        self._drive = drive
+        self._remaining_s = math.inf if duration_s is None else duration_s
+        self._slowing_s = 0.0
+
+    def _is_over(self, dt_s: float) -> bool:
+        """Whether zero is commanded from now on; a drive that does not come to rest then fails the motion."""
+        self._remaining_s -= dt_s
+        if not self.stop_reason and self._remaining_s > 0.0:
+            return False
+        self._slowing_s += dt_s
+        if self._slowing_s > REST_WITHIN_S:
+            what = (
+                f"{self._drive.name} does not come to rest: {self._drive.speed_m_s:.2f} m/s after {REST_WITHIN_S:g} s"
+            )
+            remedy = "look at its encoder and its direction, and at what turns it"
+            self.fail(DeviceFault(what, node=self._drive.node, remedy=remedy))
+        return True
+
+
+class WheelVelocity(DriveVelocity):
     """One wheel at a speed, for a time or until stopped.
 
     Args:
@@ -124,8 +157,6 @@ class WheelVelocity(Motion):
         duration_s: time from the begin after which it ends; None: until stopped.
         wheel_count: number of wheels of the vehicle.
     """
-
-    AT_REST_M_S = 0.01
 
     def __init__(
         self,
@@ -137,20 +168,17 @@ class WheelVelocity(Motion):
         duration_s: float | None,
         lease: str | None,
     ) -> None:
-        super().__init__(kind, (drive.name,), lease)
-        self._drive = drive
+        super().__init__(kind, drive, duration_s, lease)
         self._wheel = wheel
         self._count = wheel_count
         self._speed_m_s = speed_m_s
-        self._remaining_s = math.inf if duration_s is None else duration_s
         self._travel_m: float | None = None
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """The target until the time is over, then zero until the wheel is at rest."""
         travel = measurement.wheel_travel_m[self._wheel]
         self._travel_m = travel if self._travel_m is None else self._travel_m
-        self._remaining_s -= dt_s
-        over = bool(self.stop_reason) or self._remaining_s <= 0.0
+        over = self._is_over(dt_s)
         speed = measurement.wheel_speed_m_s[self._wheel]
         if over and abs(speed) < self.AT_REST_M_S:
             self.finish({"wheel_travel_m": round(travel - self._travel_m, 6)})
@@ -168,7 +196,7 @@ class WheelVelocity(Motion):
         }
 
 
-class AsideVelocity(Motion):
+class AsideVelocity(DriveVelocity):
     """A drive that moves nothing of the vehicle at a speed, for a time or until stopped; its own ramp takes it there.
 
     Args:
@@ -181,19 +209,16 @@ class AsideVelocity(Motion):
     def __init__(
         self, kind: str, drive: Drive, wheel_count: int, speed_m_s: float, duration_s: float | None, lease: str | None
     ) -> None:
-        super().__init__(kind, (drive.name,), lease)
-        self._drive = drive
+        super().__init__(kind, drive, duration_s, lease)
         self._zero = Command((0.0,) * wheel_count)
         self._speed_m_s = speed_m_s
-        self._remaining_s = math.inf if duration_s is None else duration_s
         self._from_m = drive.position_m
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """The target until the time is over, then zero until the drive is at rest."""
-        self._remaining_s -= dt_s
-        over = bool(self.stop_reason) or self._remaining_s <= 0.0
+        over = self._is_over(dt_s)
         self._drive.command_speed(0.0 if over else self._speed_m_s)
-        if over and abs(self._drive.speed_m_s) < WheelVelocity.AT_REST_M_S:
+        if over and abs(self._drive.speed_m_s) < self.AT_REST_M_S:
             self.finish({"wheel_travel_m": round(self._drive.position_m - self._from_m, 6)})
         return self._zero
 

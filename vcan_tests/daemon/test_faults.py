@@ -266,6 +266,17 @@ async def test_a_motor_with_a_broken_encoder_is_whole_again_when_the_fault_is_cl
         assert result
 
 
+async def test_a_motor_that_runs_away_is_not_left_running() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        await robot.call("simulation.lift", lifted=True)
+        await robot.call("simulation.fault", kind="encoder_reversed", part="front_left")
+        error = await _begin(robot, "motor.velocity", node=3, velocity_rpm=100.0, duration_s=0.5)
+        assert isinstance(error, DeviceFault)
+        assert "front_left" in error.message
+        assert error.remedy
+        assert not robot.network.drives["front_left"].motion.powered
+
+
 # Serial lines and bricks
 
 
