@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 from collections.abc import AsyncGenerator
+from pathlib import Path
 from types import TracebackType
 from typing import Any
 
@@ -19,7 +20,7 @@ class Client:
 
     Args:
         socket: path of the socket; None: that of ``robot``.
-        robot: name of the robot; None: the only one whose daemon runs.
+        robot: name of the robot. Without both: what CANHELM_SOCKET or CANHELM_ROBOT names, or the only one that runs.
 
     Attributes:
         lost_notifications: how many were thrown away because nobody fetched them.
@@ -53,13 +54,22 @@ class Client:
         Raises:
             DaemonNotRunning: nobody answers there.
             PermissionRefused: this user may not open the socket.
-            UsageError: several daemons run and none was chosen.
+            UsageError: several daemons run and none was chosen, or ``socket`` leads to another robot than ``robot``.
         """
         path = protocol.choose_socket(self._socket_path, self._robot)
         connection = protocol.open_socket(path)
         connection.setblocking(False)
         reader, self._writer = await asyncio.open_unix_connection(sock=connection, limit=protocol.MAX_ANSWER_BYTES)
         self._reading = asyncio.create_task(self._read(reader))
+        if self._socket_path and self._robot:
+            await self._check(path, self._robot)
+
+    async def _check(self, path: Path, robot: str) -> None:
+        try:
+            protocol.check_robot(path, robot, await self.call("hello"))
+        except CanhelmError:
+            await self.close()
+            raise
 
     async def close(self) -> None:
         """Hang up. A motion that this client holds stops."""

@@ -13,7 +13,7 @@ from types import TracebackType
 from typing import Any
 
 from canhelm import protocol
-from canhelm.errors import DaemonNotRunning, Timeout
+from canhelm.errors import CanhelmError, DaemonNotRunning, Timeout
 
 Notification = tuple[str, dict[str, Any]]
 
@@ -23,7 +23,7 @@ class Client:
 
     Args:
         socket: path of the socket; None: that of ``robot``.
-        robot: name of the robot; None: the only one whose daemon runs.
+        robot: name of the robot. Without both: what CANHELM_SOCKET or CANHELM_ROBOT names, or the only one that runs.
 
     Attributes:
         path: the socket that was chosen.
@@ -32,7 +32,7 @@ class Client:
     Raises:
         DaemonNotRunning: nobody answers there.
         PermissionRefused: this user may not open the socket.
-        UsageError: several daemons run and none was chosen.
+        UsageError: several daemons run and none was chosen, or ``socket`` leads to another robot than ``robot``.
     """
 
     def __init__(self, socket: str | os.PathLike[str] | None = None, robot: str | None = None) -> None:
@@ -43,6 +43,8 @@ class Client:
         self._last_id = 0
         self._renew_at = 0.0
         self._unanswered = 0
+        if socket and robot:
+            self._check(robot)
 
     def __enter__(self) -> Client:
         return self
@@ -91,6 +93,13 @@ class Client:
             message = self._next_message()
             if "method" in message:
                 yield str(message["method"]), message.get("params") or {}
+
+    def _check(self, robot: str) -> None:
+        try:
+            protocol.check_robot(self.path, robot, self.call("hello"))
+        except CanhelmError:
+            self.close()
+            raise
 
     def _send(self, method: str, params: dict[str, Any]) -> int:
         self._last_id += 1

@@ -154,7 +154,7 @@ def _checked_name(robot: str) -> str:
 def choose_socket(socket_path: str | os.PathLike[str] | None = None, robot: str | None = None) -> Path:
     """The socket to talk to: the one named, the one of a robot, or the only one on which a daemon answers.
 
-    What is not named comes from CANHELM_SOCKET or CANHELM_ROBOT.
+    Where neither is named, CANHELM_SOCKET or CANHELM_ROBOT names one.
 
     Raises:
         DaemonNotRunning: no socket is named and none answers.
@@ -170,6 +170,25 @@ def choose_socket(socket_path: str | os.PathLike[str] | None = None, robot: str 
         found = [folder / name for folder in (SYSTEM_FOLDER, user_folder())]
         return next((path for path in found if os.path.exists(path)), found[-1])
     return _only_one(find_sockets())
+
+
+def check_robot(path: Path, robot: str, hello: dict[str, Any]) -> None:
+    """Compare the robot that answers with the one that was asked for.
+
+    Args:
+        path: the socket.
+        robot: that the caller named.
+        hello: the daemon's answer to ``hello``.
+
+    Raises:
+        UsageError: it is another one.
+    """
+    if hello.get("robot") != robot:
+        raise UsageError(
+            f"on {path} is robot {hello.get('robot')}, not {robot}",
+            value=robot,
+            remedy=f"leave --socket out to reach {robot}, or --robot to reach {hello.get('robot')}",
+        )
 
 
 def find_sockets() -> list[Path]:

@@ -83,12 +83,19 @@ URGENT = (("stop",), ("estop",))
 ENVIRONMENT = "CANHELM_"
 
 
+CHOOSING = ("--socket", "--robot")
+"""Options that choose a daemon: where one of them is given, the environment does not add the other."""
+
+
 def from_environment(app: App, commands: tuple[str, ...], arguments: ArgumentCollection) -> None:
     """``CANHELM_OPTION`` for every option that the command line did not give; an empty one counts as not given."""
+    choosing = [argument for argument in arguments if argument.name in CHOOSING]
     for argument in arguments:
         variable = ENVIRONMENT + argument.name.removeprefix("--").upper().replace("-", "_")
         value = os.environ.get(variable)
         if not value or argument.tokens or not argument.name.startswith("--"):
+            continue
+        if argument.name in CHOOSING and any(other.tokens for other in choosing):
             continue
         argument.append(Token(keyword=variable, value=value, source="env"))
         if commands in URGENT and not _is_valid(argument):

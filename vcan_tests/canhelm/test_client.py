@@ -237,3 +237,20 @@ async def test_an_asynchronous_client_that_lost_its_place_is_told_why(server: Se
         await asyncio.sleep(0.05)  # a write before the farewell is read would end the connection without it
         with pytest.raises(Refused, match="too many clients"):
             await client.call("motor.velocity", node=1, velocity_rpm=1)
+
+
+def test_a_socket_with_another_robot_behind_it_is_refused(server: Server) -> None:
+    with Client(server.path, "fake") as client:
+        assert client.call("hello")["robot"] == "fake"
+    with pytest.raises(UsageError, match="is robot fake, not lab1"):
+        Client(server.path, "lab1")
+
+
+def test_a_socket_with_another_robot_behind_it_is_refused_on_asyncio_too(server: Server) -> None:
+    async def robot_behind(name: str) -> str:
+        async with aio.Client(server.path, name) as client:
+            return str((await client.call("hello"))["robot"])
+
+    assert asyncio.run(robot_behind("fake")) == "fake"
+    with pytest.raises(UsageError, match="is robot fake, not lab1"):
+        asyncio.run(robot_behind("lab1"))

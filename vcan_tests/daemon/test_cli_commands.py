@@ -48,6 +48,57 @@ def canhelm(line: str) -> subprocess.Popen[str]:
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
+# -- which daemon is asked ------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def nearby(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[FakeBackend]:
+    """Another robot, ``other``, whose daemon listens in the folder of sockets."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.setattr(protocol, "SYSTEM_FOLDER", tmp_path / "no-system")
+    (tmp_path / "canhelm").mkdir()
+    other = FakeBackend()
+    other.robot = "other"
+    with served(other, tmp_path / "canhelm" / "other.sock"):
+        yield other
+
+
+@pytest.mark.real_time
+def test_a_robot_that_is_named_goes_before_a_socket_in_the_environment(
+    server: Server, backend: FakeBackend, nearby: FakeBackend
+) -> None:
+    assert run("estop --robot other") == 0
+    assert ([call[0] for call in nearby.calls], backend.calls) == (["estop"], [])
+
+
+@pytest.mark.real_time
+def test_a_robot_that_does_not_run_is_no_reason_to_ask_another(
+    server: Server, backend: FakeBackend, nobody: None, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CANHELM_SOCKET", os.fspath(server.path))
+    assert run("steer front 5 --robot other") == 3
+    assert ("other.sock" in capsys.readouterr().err, backend.calls) == (True, [])
+
+
+@pytest.mark.real_time
+def test_a_socket_that_is_named_goes_before_a_robot_in_the_environment(
+    server: Server, backend: FakeBackend, nearby: FakeBackend, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CANHELM_ROBOT", "other")
+    assert run(f"stop --socket {server.path}") == 0
+    assert ([call[0] for call in backend.calls], nearby.calls) == (["stop"], [])
+
+
+@pytest.mark.real_time
+def test_a_robot_that_is_not_the_one_behind_the_named_socket_is_refused(
+    server: Server, backend: FakeBackend, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(f"motor velocity 1 100 --socket {server.path} --robot other") == 2
+    assert "is robot fake, not other" in capsys.readouterr().err
+    assert run(f"stop --socket {server.path} --robot fake") == 0
+    assert [call[0] for call in backend.calls] == ["stop"]
+
+
 # -- what is sent -----------------------------------------------------------------------------------------------------
 
 SENT: list[tuple[str, str, dict[str, Any]]] = [
