@@ -158,6 +158,7 @@ class FaultFile(Part, frozen=True, kw_only=True):
     faults: tuple[Fault, ...]
 
 
+_WANTED = "write faults: with a list of them"
 _FILE_TYPE = msgspec.inspect.type_info(FaultFile)
 _DEFAULTS = dict(zip(Fault.__struct_fields__[1:], Fault.__struct_defaults__, strict=True))
 
@@ -218,11 +219,11 @@ def load_faults(file: Path, profile: Profile) -> tuple[PlacedFault, ...]:
         UsageError: it cannot be read, or has mistakes; the message has file:line of each.
     """
     mistakes: list[Mistake] = []
-    tree = Reader(file, mistakes).read()
+    tree = Reader(file, mistakes, _WANTED).read()
     if tree is None or mistakes:
         raise _mistaken(file, mistakes)
     if not isinstance(tree, Mapping):
-        raise _mistaken(file, [Mistake(tree.place, "", "is not a mapping", "write faults: with a list of them")])
+        raise _mistaken(file, [Mistake(tree.place, "", "is not a mapping", _WANTED)])
     data = Shape(mistakes).walk(tree, _FILE_TYPE)
     if mistakes:
         raise _mistaken(file, mistakes)

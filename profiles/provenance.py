@@ -167,11 +167,21 @@ for _kind, (_pattern, _first) in _SYNTAX.items():
 
 
 class Reader:
-    """Reads one file into a :class:`Node`; what is wrong with it goes to ``mistakes``."""
+    """Reads one file into a :class:`Node`; what is wrong with it goes to ``mistakes``.
 
-    def __init__(self, path: Path, mistakes: list[Mistake]) -> None:
+    Args:
+        wanted: what to write into a file that is empty.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        mistakes: list[Mistake],
+        wanted: str = "write a profile, or extends: max2d to begin with a shipped one",
+    ) -> None:
         self.path = path
         self.mistakes = mistakes
+        self.wanted = wanted
 
     def read(self) -> Node | None:
         """The file's content, or None when it cannot be read at all."""
@@ -206,7 +216,7 @@ class Reader:
             self._wrong(line, f"character U+{ord(text[error.position]):04X} is not allowed", "remove it")
             return None
         if root is None:
-            self._wrong(1, "is empty", "write a profile, or extends: max2d to begin with a shipped one")
+            self._wrong(1, "is empty", self.wanted)
         return root
 
     def _place(self, node: yaml.Node) -> Place:

@@ -18,6 +18,7 @@ fault = App(name="fault")
 Kind = Annotated[str, Parameter(help="What happens: lose, silence, emcy, encoder_stuck, ...; docs/faults.md has all.")]
 Part = Annotated[str | None, Parameter(help="Drive, encoder, brake or brick, by its name, or a node id.")]
 _OWN = ("fault", "kind", "part", "state", "struck")
+_HEXADECIMAL = ("cob_id", "code", "value")
 
 
 @fault.default
@@ -99,6 +100,6 @@ def _table(rows: Sequence[Mapping[str, Any]]) -> Table:
 
     table = Table(*_OWN, "more")
     for row in rows:
-        more = {key: value for key, value in row.items() if key not in _OWN}
+        more = {key: hex(row[key]) if key in _HEXADECIMAL else row[key] for key in row if key not in _OWN}
         table.add_row(*(words(row.get(key)) for key in _OWN), words(more))
     return table
