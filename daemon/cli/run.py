@@ -88,6 +88,7 @@ def run(
     for option, wanted in (("--miswire", miswire), ("--faults", faults)):
         if wanted and not simulates(chosen):
             raise UsageError(f"{option} is for simulated robots, and {chosen} is real", remedy="leave it out")
+    struck_by = load_faults(faults, robot) if faults else ()
     if profile and bit_rate is not None:
         raise UsageError("--bit-rate is for a bus without a profile", remedy="write network.bit_rate in the profile")
     for given in (socket, gateway):
@@ -109,7 +110,7 @@ def run(
         built=load(miswire).profile if miswire else None,
         runs=_store(runs, runs_mb, robot.name),
         profile_file=loaded.path.resolve() if loaded else None,
-        faults=load_faults(faults, robot) if faults else (),
+        faults=struck_by,
     )
     runner: Callable[[Coroutine[Any, Any, str]], str] = run_patient if simulates(chosen) else asyncio.run
     say(runner(_live(make_app, profile, robot)))

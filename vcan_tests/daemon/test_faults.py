@@ -11,9 +11,12 @@ import pytest
 
 from canhelm.errors import CanhelmError, DeviceFault, Refused, UsageError
 from daemon.app import App
+from daemon.cli.main import main
+from daemon.demo import FIGURES, Demo
 from drivers.simulated.max2d import Max2dWorld
 from profiles.faults import load_faults
 from profiles.loader import load
+from profiles.schema import BodyGeometry
 from vcan_tests.daemon.nxt_twin import NXT
 from vcan_tests.robot import Robot, running_robot
 
@@ -348,3 +351,45 @@ async def test_a_fault_of_a_file_that_cannot_happen_here_is_told_with_its_line(t
     with pytest.raises(UsageError, match=r"faults.yaml:3: there is no simulated serial line"):
         await app.start()
     await app.close()
+
+
+@pytest.mark.parametrize("profile", ["max2d", "turtle", "ackermann", "semitrailer"])
+async def test_the_driven_wheels_of_every_vehicle_on_a_floor_can_stand_on_ice(profile: str) -> None:
+    robot = load(profile).profile
+    assert isinstance(robot.vehicle, BodyGeometry)
+    app = App(robot)
+    for name in robot.vehicle.wheels:
+        told = await app.service.call("simulation.fault", {"kind": "ice", "part": name}, app.service.open_lease("test"))
+        assert told["state"] == "acting"
+    await app.close()
+
+
+# Commands
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("run --profile max2d --bus socketcan:can0 --faults faults.yaml", "--faults is for simulated robots"),
+        ("run --profile max2d --simulate --faults none.yaml", "none.yaml:1: cannot be read"),
+        ("demo --figure nxt --faults faults.yaml", "--faults is for the figures of the MAX2D"),
+        ("demo --figure 4.6 --virtual-time --faults faults.yaml", "faults.yaml:3: faults[0].delay_s: means nothing"),
+        ("simulate --profile nxt --bus serial:pty --faults empty.yaml", "--faults is for a network"),
+    ],
+)
+def test_a_command_refuses_faults_that_make_no_sense(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], line: str, told: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("faults.yaml").write_text("faults:\n- kind: lose\n  delay_s: 1\n")
+    Path("empty.yaml").write_text("faults: []\n")
+    assert main(line.split()) == 2
+    assert told in capsys.readouterr().err
+
+
+async def test_a_demo_that_a_fault_strikes_ends_with_its_cause(tmp_path: Path) -> None:
+    file = tmp_path / "faults.yaml"
+    file.write_text("faults:\n- {kind: emcy, part: front_left, code: 0x4210, at_s: 1}\n")
+    demo = Demo(MAX2D, 1, None, lambda _: None, faults=load_faults(file, MAX2D))
+    with pytest.raises(DeviceFault, match="front_left\\) reports over-temperature"):
+        await demo.run(FIGURES[:1])
