@@ -12,7 +12,7 @@ from daemon.loops.omni import Motion, OmniKinematics, OmniWheel
 from daemon.loops.slip_observer import Body, Observed, ObserverTuning, SlipObserver, rim_drive
 from profiles.schema import OmniGeometry, Profile
 
-BY_ACCELEROMETER: Final = ObserverTuning(trust_s=0.4, distrust_s=1.0, turning_by_wheels=True)
+BY_ACCELEROMETER: Final = ObserverTuning(trust_s=0.4, distrust_s=1.0, missed_m_s2=0.1, turning_by_wheels=True)
 BY_CURRENTS: Final = ObserverTuning(trust_s=0.25, distrust_s=1.5, slip_m_s=0.12, turning_by_wheels=True)
 """Forces by currents are less exact than an accelerometer: the observer is not to believe them for long."""
 LONGEST_SLIP_S: Final = 0.8

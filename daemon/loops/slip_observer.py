@@ -28,6 +28,8 @@ Motion = tuple[float, float, float]
 
 BREAKAWAY_M_S: Final = 0.01
 """Rim speed from which dry friction is all there; of a standing wheel it takes what it can of the motor's force."""
+MISSED_PART: Final = 0.4
+"""Part of a gentle acceleration that a sample may miss where drives ramp to each new target in a part of the cycle."""
 SWEEPS: Final = 4
 """Times that the impulses of all rows are computed a cycle; what is left, the next cycle takes."""
 
@@ -84,7 +86,9 @@ class ObserverTuning:
         distrust_s: the same for wheels that slip: errors of the model do not add up for ever.
         slip_m_s: rim speed above the body's at which slip begins.
         slip_ratio: part of the body's speed that is added to it; tyres creep when they pull.
-        grip_part: slip ends below this part of what begins it.
+        missed_m_s2: what samples of the acceleration may miss of it while wheels change their speed; the error of the
+            observed motion that comes of it is added instead, where it is larger.
+        grip_part: slip ends below this part of what begins it while no wheel changes its speed.
         turning_by_wheels: the median of what the wheels say of the yaw rate counts, not what forces say.
     """
 
@@ -93,6 +97,7 @@ class ObserverTuning:
     distrust_s: float = 3.0
     slip_m_s: float = 0.06
     slip_ratio: float = 0.06
+    missed_m_s2: float = 0.0
     grip_part: float = 0.6
     turning_by_wheels: bool = False
 
@@ -154,6 +159,7 @@ class SlipObserver:
         self._last = Observed(rest, rest, none, (0.0, 0.0), none, none, (False,) * len(self._rows))
         self._speeds: tuple[float, ...] = ()
         self._currents: tuple[float, ...] = ()
+        self._doubt_m_s = 0.0
 
     def step(
         self,
@@ -175,6 +181,7 @@ class SlipObserver:
         if not self._speeds:
             self._begin(wheel_speeds, currents_a)
         slopes = self._smooth(wheel_speeds, currents_a, dt)
+        self._doubt_m_s = self._doubted(max(map(abs, slopes)), dt)
         readings = zip(self._drives, self._currents, self._speeds, slopes, strict=True)
         forces = tuple(drive.floor_force(current, speed, slope) for drive, current, speed, slope in readings)
         x, y, turn = self._body.acceleration(self._rows, forces)
@@ -199,6 +206,11 @@ class SlipObserver:
         self._speeds = tuple(old + change for old, change in zip(self._speeds, changes, strict=True))
         self._currents = tuple(old + part * (new - old) for new, old in zip(currents, self._currents, strict=True))
         return [change / dt for change in changes]
+
+    def _doubted(self, acceleration: float, dt: float) -> float:
+        """Speed by which samples may have led the observed motion astray, as far as wheels have not put it right."""
+        missed = min(self._tuning.missed_m_s2, MISSED_PART * acceleration)
+        return (self._doubt_m_s + missed * dt) * math.exp(-dt / self._tuning.trust_s)
 
     def _integrated(self, acceleration: Motion, speeds: Sequence[float], dt: float) -> Motion:
         """In the body's frame, which turns: dv/dt = a - w x v."""
@@ -236,8 +248,9 @@ class SlipObserver:
 
     def _judged(self, motion: Motion, slip: Sequence[float]) -> tuple[bool, ...]:
         tuning = self._tuning
-        begins = tuning.slip_m_s + tuning.slip_ratio * math.hypot(motion[0], motion[1])
-        ends = tuning.grip_part * begins
+        creep = tuning.slip_ratio * math.hypot(motion[0], motion[1])
+        begins = tuning.slip_m_s + max(creep, self._doubt_m_s)
+        ends = tuning.grip_part * (tuning.slip_m_s + creep)
         return tuple(abs(now) > (ends if was else begins) for now, was in zip(slip, self._last.slipping, strict=True))
 
 

@@ -10,7 +10,7 @@ from canhelm.errors import Refused, UsageError
 from daemon.loops.accelerometer import Mounting
 from daemon.loops.jerk_limit import JerkLimitedGuide
 from daemon.loops.measurement import Measurement
-from daemon.loops.omni_drive import PATIENCE_S, OmniLaw
+from daemon.loops.omni_drive import OmniLaw
 from daemon.loops.omni_guide import GoalGuide, Guide, PublishedGuide, Signals, Twist, TwistGuide
 from daemon.loops.omni_senses import OmniSenses, omni_kinematics, omni_observer
 from daemon.loops.planner import FARTHEST, PlanarLimits, PlanarState
@@ -103,10 +103,6 @@ class OmniVehicle(Vehicle):
         """Speed in both directions, and yaw rate."""
         speed, rate = both_ways(self.limits.speed), both_ways(self.profile.limits.yaw_rate_deg_s)
         return {"speed": speed, "sideways": speed, "yaw_rate": rate}
-
-    def ramp_s(self) -> float:
-        """The ramps, and what the law gives the robot to come to where it should stand."""
-        return super().ramp_s() + PATIENCE_S
 
     def to_goal(
         self,

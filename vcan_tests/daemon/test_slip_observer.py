@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from daemon.loops.accelerometer import Accelerometer, Mounting
-from daemon.loops.slip_observer import Observed, SlipObserver
+from daemon.loops.omni_senses import BY_ACCELEROMETER
+from daemon.loops.slip_observer import Observed, ObserverTuning, SlipObserver
 from daemon.loops.wheel_grip import WheelGrip, WheelGripTuning
 from vcan_tests.daemon.gripping_robot import BODY, DRIVE, KINEMATICS, PLACE, ROTATION
 from vcan_tests.daemon.omni_floor import CYCLE_S, OmniFloor, Place, dry, ice_between
 
 WALL_X_M = 0.05
+PRECISE = replace(BY_ACCELEROMETER, missed_m_s2=0.0)
 
 
 class Bench:
@@ -91,6 +94,18 @@ def test_a_measured_acceleration_takes_the_place_of_the_forces() -> None:
     observer = SlipObserver(BODY, [DRIVE] * 3, KINEMATICS.forward)
     seen = observer.step((0.0, 0.0, 0.0), (5.0, 5.0, 5.0), CYCLE_S, measured=(0.4, -0.2))
     assert seen.acceleration[:2] == (0.4, -0.2)
+
+
+@pytest.mark.parametrize(("tuning", "slips"), [(BY_ACCELEROMETER, False), (PRECISE, True)])
+def test_samples_that_miss_a_part_of_the_acceleration_are_no_slip_where_that_is_allowed_for(
+    tuning: ObserverTuning, slips: bool
+) -> None:
+    """Drives that ramp to each target in a part of the cycle: samples tell 1.02 for 1.2 m/s2."""
+    observer, slipped = SlipObserver(BODY, [DRIVE] * 3, KINEMATICS.forward, tuning=tuning), False
+    for cycle in range(100):
+        rims = KINEMATICS.wheel_speeds((1.2 - 1.2 * cycle * CYCLE_S, 0.0, 0.0))
+        slipped |= any(observer.step(rims, (0.0, 0.0, 0.0), CYCLE_S, measured=(-1.02, 0.0)).slipping)
+    assert slipped is slips
 
 
 def test_pushing_a_wall_pulls_harder_with_the_wheels_held_near_their_best() -> None:

@@ -115,6 +115,33 @@ async def test_a_stream_of_twists_drives_a_circle_and_a_stale_one_stops() -> Non
 
 
 @pytest.mark.parametrize(
+    ("rate_deg_s", "speed_m_s", "direction_deg"),
+    [(90.0, 0.0, 0.0), (-90.0, 0.0, 0.0), (90.0, 1.0, -120.0), (0.0, 1.2, 180.0)],
+)
+@pytest.mark.parametrize("stopped", [True, False], ids=["stopped", "silent"])
+async def test_after_a_fast_twist_it_comes_to_rest_by_its_ramp_and_stays(
+    stopped: bool, rate_deg_s: float, speed_m_s: float, direction_deg: float
+) -> None:
+    """On floor that grips nothing is taken for slip, however much the samples of the accelerometer miss."""
+    twist = {"yaw_rate_deg_s": rate_deg_s, "speed_m_s": speed_m_s, "direction_deg": direction_deg}
+    async with running_robot(TURTLE, seed=2) as robot:
+        slips: list[bool] = []
+        robot.app.supervisor.observers.append(lambda: slips.append(vehicle_of(robot).senses.slipping))
+        for _ in range(80):
+            driven = await robot.call("drive.set", **twist, valid_for_ms=200)
+            await asyncio.sleep(0.05)
+        stopping = asyncio.create_task(robot.call("motion.stop", motion=driven["motion"])) if stopped else None
+        await asyncio.sleep(max(abs(rate_deg_s) / 120.0, speed_m_s / 1.2) + (0.0 if stopped else 0.15) + 0.3)
+        at_rest = pose_of(robot)
+        assert abs(world_of(robot).velocity[2]) < 0.02
+        await asyncio.sleep(2.0)
+        assert pose_of(robot) == pytest.approx(at_rest, abs=0.002)
+        assert not any(slips)
+        if stopping is not None:
+            await stopping
+
+
+@pytest.mark.parametrize(
     ("method", "params", "error"),
     [
         ("drive.to", {"x_m": math.nan, "y_m": 0.0}, UsageError),
