@@ -269,8 +269,8 @@ class Connection(asyncio.Protocol):
 
     async def _close_lease(self, params: dict[str, Any]) -> dict[str, Any]:
         if self._lease is not None:
-            self._server.backend.close_lease(self._lease, "its client ended it")
-            self._lease = None
+            lease, self._lease = self._lease, None
+            await self._server.backend.end_lease(lease, "its client ended it")
         if self._moving:
             await asyncio.wait(list(self._moving))
         return {"state": str(self._server.backend.state)}

@@ -66,7 +66,11 @@ class Backend(Protocol):
         ...
 
     def close_lease(self, lease: str, reason: str = "its client hung up") -> None:
-        """The client is gone, or lets go: its motions stop."""
+        """The client is gone: its motions stop."""
+        ...
+
+    async def end_lease(self, lease: str, reason: str) -> None:
+        """The client lets go: its motions stop; returns when they have ended."""
         ...
 
     async def call(self, method: str, params: dict[str, Any], lease: str | None) -> dict[str, Any]:

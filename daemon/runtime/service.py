@@ -56,6 +56,7 @@ class Service:
         self.open_lease = supervisor.open_lease
         self.renew_lease = supervisor.renew_lease
         self.close_lease = supervisor.close_lease
+        self.end_lease = supervisor.end_lease
         self._supervisor = supervisor
         self._bus = bus
         self._cycle = cycle

@@ -25,7 +25,8 @@ ENDLESS_S = 60.0
 class FakeBackend:
     """Fulfils ``daemon.api.server.Backend`` without a bus.
 
-    A motion lasts its ``duration_s``, or until its lease closes or runs out.
+    A motion lasts its ``duration_s``, or until its lease closes or runs out. A stream of ``drive.set`` comes to rest
+    when :attr:`at_rest` is set.
     """
 
     def __init__(self, lease_timeout_s: float = 1.5) -> None:
@@ -39,6 +40,8 @@ class FakeBackend:
         self.called = threading.Event()
         self.ran_out = threading.Event()
         self.renewals = 0
+        self.at_rest = asyncio.Event()
+        self.at_rest.set()
         self.padding = ""
         self.cycle = {"cycles": 10}
         self.loop: asyncio.AbstractEventLoop
@@ -88,6 +91,10 @@ class FakeBackend:
                 self.stopped.append(lease)
                 self.stop_reasons.append(reason)
                 motion.set_result(None)
+
+    async def end_lease(self, lease: str, reason: str) -> None:
+        self.close_lease(lease, reason)
+        await self.at_rest.wait()
 
     async def call(self, method: str, params: dict[str, Any], lease: str | None) -> dict[str, Any]:
         self.calls.append((method, params, lease))

@@ -119,3 +119,16 @@ async def test_a_curve_of_the_paired_robot_has_both_pairs_against_each_other() -
         headings = [math.degrees(robot.network.world.heading_rad(pair)) for pair in ("rear", "front")]
         assert headings == pytest.approx([10.0, -10.0], abs=0.3)
         assert robot.network.world.velocity[2] < -0.1
+
+
+@pytest.mark.parametrize("name", ["ackermann", "max2d", "nxt", "semitrailer", "turtle"])
+async def test_the_end_of_its_lease_waits_until_a_streamed_motion_is_at_rest(name: str) -> None:
+    async with running_robot(load(name).profile) as robot:
+        for _ in range(40):
+            await robot.call("drive.set", speed_m_s=0.15, valid_for_ms=300)
+            await asyncio.sleep(0.05)
+        moving, lease = robot.app.service.status()["motions"], robot.lease
+        assert lease is not None
+        await robot.hang_up()
+        await robot.app.service.end_lease(lease, "its client ended it")
+        assert ([motion["kind"] for motion in moving], robot.state) == (["drive.set"], "idle")

@@ -45,6 +45,18 @@ async def test_closing_the_lease_answers_after_the_motion_has_ended(client: RawC
     assert [(await client.answer())["id"], (await client.answer())["id"]] == [1, 2]
 
 
+async def test_closing_the_lease_answers_after_a_streamed_motion_has_come_to_rest(
+    client: RawClient, backend: FakeBackend
+) -> None:
+    backend.at_rest.clear()
+    await client.ask("drive.set", speed_m_s=0.3, valid_for_ms=200)
+    client.send(protocol.make_request(2, "lease.close", {}))
+    client.send(protocol.make_request(3, "hello", {}))
+    before = (await client.answer())["id"]
+    backend.at_rest.set()
+    assert (before, (await client.answer())["id"]) == (3, 2)
+
+
 async def test_a_command_after_a_lease_ran_out_begins_a_new_one(client: RawClient, backend: FakeBackend) -> None:
     await client.ask("motor.velocity", node=1, velocity_rpm=100, duration_s=0.01)
     backend.close_lease("lease-1")
