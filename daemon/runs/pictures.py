@@ -13,7 +13,7 @@ from typing import Any
 
 import matplotlib as mpl
 
-from daemon.runs.signs import read_signs
+from daemon.runs.signs import currents_at_limit, read_signs
 from daemon.runs.store import PROFILE, TERMS, Run, read_yaml
 from daemon.runs.table import Table, read_table
 
@@ -22,6 +22,7 @@ from matplotlib import pyplot as plt
 
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
 """Okabe and Ito's palette, which colour-blind people can tell apart."""
+STYLES = ("-", "--")
 COLUMNS = 2
 SLIP = "slip along {}"
 
@@ -41,9 +42,9 @@ def draw(run: Run, path: Path) -> list[str]:
         OSError: the picture cannot be written.
         ValueError: the ending means no format.
     """
-    table = read_table(run)
-    signs = read_signs(table, read_yaml(run.folder / PROFILE))
-    shown = list(panels(run, table))
+    table, profile = read_table(run), read_yaml(run.folder / PROFILE)
+    signs = read_signs(table, profile)
+    shown = list(panels(run, table, profile))
     rows = math.ceil(len(shown) / COLUMNS)
     figure, grid = plt.subplots(rows, COLUMNS, figsize=(14, 4 * rows), layout="constrained", squeeze=False)
     figure.suptitle(_title(run, signs))
@@ -56,7 +57,7 @@ def draw(run: Run, path: Path) -> list[str]:
     return signs
 
 
-def panels(run: Run, table: Table) -> Iterator[partial[None]]:
+def panels(run: Run, table: Table, profile: Mapping[str, Any]) -> Iterator[partial[None]]:
     """What the robot has, in the order of the picture; a quantity that nothing has told is left out."""
     yield partial(_track, table=table)
     headings, currents = _told(table.of("heading_deg")), _told(table.of("current_a"))
@@ -72,7 +73,7 @@ def panels(run: Run, table: Table) -> Iterator[partial[None]]:
     if measured:
         title = "motor currents (positive: pushes forward)"
         yield partial(_lines, table=table, columns=currents, title=title, label="current [A]")
-    yield partial(_active, table=table, times={**table.limits(), **_slips(run)})
+    yield partial(_active, table=table, times={**table.limits(), **currents_at_limit(table, profile), **_slips(run)})
 
 
 def _told(columns: Mapping[str, list[float]]) -> dict[str, list[float]]:
@@ -106,9 +107,9 @@ def _track(axes: Any, table: Table) -> None:
 
 
 def _speeds(axes: Any, table: Table) -> None:
-    _lines(axes, table, table.of("speed_m_s"), "wheel speeds (dashed: commanded)", "rim speed [m/s]")
+    _lines(axes, table, table.of("speed_m_s"), "wheel speeds (dotted: commanded)", "rim speed [m/s]")
     for number, column in enumerate(table.of("commanded_m_s").values()):
-        axes.plot(table.time_s, column, "--", color=_colour(number), linewidth=0.8)
+        axes.plot(table.time_s, column, ":", color=_colour(number), linewidth=1)
 
 
 def _deviations(table: Table) -> dict[str, list[float]]:
@@ -120,8 +121,9 @@ def _deviations(table: Table) -> dict[str, list[float]]:
 
 
 def _lines(axes: Any, table: Table, columns: Mapping[str, list[float]], title: str, label: str) -> None:
+    """Every other line is dashed: where two lie upon each other, both are seen."""
     for number, (name, column) in enumerate(columns.items()):
-        axes.plot(table.time_s, column, color=_colour(number), label=name)
+        axes.plot(table.time_s, column, STYLES[number % len(STYLES)], color=_colour(number), label=name)
     axes.set(title=title, xlabel="time [s]", ylabel=label)
     _finish(axes)
 

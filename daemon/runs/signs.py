@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import groupby
 from statistics import fmean, median
 from typing import Any
 
@@ -17,6 +18,12 @@ SHORTEST_S = 0.5
 OUTLIER_SHARE = 0.25
 """Of the continuous current, by which a wheel's current stands out from the others'."""
 FEWEST_WHEELS = 3
+CURRENT_LIMITS = ("continuous_current_a", "output_current_a")
+"""Of a drive in the profile; it cuts the current off at the second at once, and at the first after a while."""
+AT_LIMIT_SHARE = 0.01
+"""Of a current limit, by which a current that is held there is measured beside it."""
+HELD_S = 0.1
+"""A current that passes by a limit is away sooner."""
 
 
 def side_by_side(table: Table) -> list[int]:
@@ -67,10 +74,38 @@ def read_signs(table: Table, profile: Mapping[str, Any]) -> list[str]:
     if abs(away[name]) < OUTLIER_SHARE * continuous_a:
         return []
     does, size = ("pushes", "larger") if away[name] > 0 else ("is dragged", "smaller")
+    others = sorted(current for wheel, current in currents.items() if wheel != name)
     return [
-        f"{name} {does}: {currents[name]:+.2f} A, the other wheels {_others(currents, name):+.2f} A at the same speed; "
-        f"its wheel is {size} than the profile's wheel_radius_m says, or its gear ratio or encoder pulses are wrong"
+        f"{name} {does}: {currents[name]:+.2f} A, the other wheels {others[0]:+.2f} to {others[-1]:+.2f} A at the same "
+        f"speed; its wheel is {size} than the profile's wheel_radius_m says, or its gear ratio or encoder pulses are "
+        f"wrong"
     ]
+
+
+def currents_at_limit(table: Table, profile: Mapping[str, Any]) -> dict[str, list[float]]:
+    """When a drive held its motor's current at one of its limits, by motor and limit (``rear_left at 5 A``) [s].
+
+    Args:
+        table: of the run.
+        profile: the run's own; motors that have no such limit in it are left out.
+    """
+    times: dict[str, list[float]] = {}
+    for name, column in table.of("current_a").items():
+        drive = profile.get("drives", {}).get(name, {})
+        for limit_a in [float(drive[key]) for key in CURRENT_LIMITS if key in drive]:
+            if when := _held(table.time_s, column, limit_a):
+                times[f"{name} at {limit_a:g} A"] = when
+    return times
+
+
+def _held(time_s: Sequence[float], current_a: Sequence[float], limit_a: float) -> list[float]:
+    held: list[float] = []
+    near = [abs(abs(current) - limit_a) <= AT_LIMIT_SHARE * limit_a for current in current_a]
+    for at_limit, rows in groupby(zip(time_s, near, strict=True), key=lambda row: row[1]):
+        times = [time for time, _ in rows]
+        if at_limit and times[-1] - times[0] >= HELD_S:
+            held.extend(times)
+    return held
 
 
 def _others(currents: Mapping[str, float], name: str) -> float:

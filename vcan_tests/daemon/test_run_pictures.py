@@ -10,9 +10,9 @@ import yaml
 
 from daemon.cli.main import main
 from daemon.runs.pictures import panels
-from daemon.runs.signs import read_signs, side_by_side
+from daemon.runs.signs import currents_at_limit, mean_currents_a, read_signs, side_by_side
 from daemon.runs.store import PROFILE, TERMS, Run, RunStore, read_runs, read_yaml
-from daemon.runs.table import read_table
+from daemon.runs.table import Table, read_table
 from daemon.runtime.clock import run_virtual
 from profiles.loader import load
 from profiles.schema import Profile
@@ -44,6 +44,10 @@ def signs_of(run: Run) -> list[str]:
     return read_signs(read_table(run), read_yaml(run.folder / PROFILE))
 
 
+def limits_of(run: Run) -> dict[str, list[float]]:
+    return currents_at_limit(read_table(run), read_yaml(run.folder / PROFILE))
+
+
 def test_a_wheel_that_is_too_large_stands_out_by_pushing(tmp_path: Path) -> None:
     (sign,) = signs_of(driven(tmp_path, wrong_wheel(tmp_path, 0.105)))
     assert sign.startswith("rear_left pushes: +")
@@ -65,6 +69,29 @@ def test_nothing_stands_out_of_a_healthy_run(tmp_path: Path) -> None:
     run = driven(tmp_path)
     assert len(side_by_side(read_table(run))) > 100
     assert signs_of(run) == []
+    assert limits_of(run) == {}
+
+
+def test_the_others_currents_are_told_from_the_least_to_the_greatest(tmp_path: Path) -> None:
+    run = driven(tmp_path, wrong_wheel(tmp_path, 0.105))
+    table = read_table(run)
+    means = mean_currents_a(table, side_by_side(table))
+    others = [means[name] for name in ("rear_right", "front_left", "front_right")]
+    assert f"the other wheels {min(others):+.2f} to {max(others):+.2f} A at the same speed" in signs_of(run)[0]
+
+
+def test_a_current_that_a_drive_holds_at_its_limit_is_a_limit_in_force(tmp_path: Path) -> None:
+    times = limits_of(driven(tmp_path, wrong_wheel(tmp_path, 0.105)))
+    assert list(times) == ["rear_left at 2.64 A", "rear_left at 5 A"]
+    assert times["rear_left at 5 A"][-1] < times["rear_left at 2.64 A"][0]
+
+
+@pytest.mark.parametrize(("rows", "held"), [(5, False), (20, True)])
+def test_a_current_that_passes_by_a_limit_is_not_held_there(rows: int, held: bool) -> None:
+    column = [0.0] * 10 + [-1.995] * rows + [0.0] * 10
+    table = Table({"time_s": [row * 0.01 for row in range(len(column))], "left.current_a": column}, {})
+    times = currents_at_limit(table, {"drives": {"left": {"continuous_current_a": 2.0}}})
+    assert times == ({"left at 2 A": pytest.approx([row * 0.01 for row in range(10, 10 + rows)])} if held else {})
 
 
 def test_a_curve_says_nothing_about_radii(tmp_path: Path) -> None:
@@ -90,7 +117,7 @@ def test_a_picture_has_no_empty_panels(tmp_path: Path) -> None:
 
     run_virtual(drive())
     run = read_runs([tmp_path])[-1]
-    titles = [panel.keywords.get("title") for panel in panels(run, read_table(run))]
+    titles = [panel.keywords.get("title") for panel in panels(run, read_table(run), read_yaml(run.folder / PROFILE))]
     assert "steering headings, by their encoders" not in titles
     assert "motor currents (positive: pushes forward)" not in titles
     assert len(titles) == 4
