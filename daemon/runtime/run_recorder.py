@@ -117,7 +117,9 @@ class RunRecorder:
         self._bus.taps.append(self._on_frame)
 
     def close(self) -> None:
-        """End the runs under way and write what is left."""
+        """End the runs under way and write what is left; nothing where it was never started."""
+        if self._on_motion not in self._supervisor.on_motion:
+            return
         self._supervisor.on_motion.remove(self._on_motion)
         self._supervisor.observers.remove(self._on_cycle)
         self._bus.taps.remove(self._on_frame)

@@ -73,11 +73,10 @@ def test_a_robot_that_is_named_goes_before_a_socket_in_the_environment(
 
 @pytest.mark.real_time
 def test_a_robot_that_does_not_run_is_no_reason_to_ask_another(
-    server: Server, backend: FakeBackend, nobody: None, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    server: Server, backend: FakeBackend, nearby: FakeBackend, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setenv("CANHELM_SOCKET", os.fspath(server.path))
-    assert run("steer front 5 --robot other") == 3
-    assert ("other.sock" in capsys.readouterr().err, backend.calls) == (True, [])
+    assert run("steer front 5 --robot third") == 3
+    assert ("third.sock" in capsys.readouterr().err, backend.calls, nearby.calls) == (True, [], [])
 
 
 @pytest.mark.real_time

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -98,6 +99,18 @@ async def test_a_daemon_that_cannot_record_says_only_that(tmp_path: Path, caplog
         await app.start()
     await app.close()
     assert caplog.messages == []
+
+
+@pytest.mark.real_time
+def test_a_socket_that_a_daemon_has_already_is_told_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "robot.sock"
+    command = [sys.executable, "-m", "daemon", *SIMULATED, "--socket", str(path), "--runs", str(tmp_path / "runs")]
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(os.fspath(path))
+        listener.listen()
+        ended = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert ended.returncode == 1
+    assert [line.partition(" on ")[0] for line in ended.stderr.splitlines()] == ["canhelm: a daemon already answers"]
 
 
 @pytest.mark.parametrize("option", ["--socket", "--gateway"])
