@@ -1,4 +1,4 @@
-"""``canhelm replay``: a candump log as the daemon reads it."""
+"""``canhelm replay``: a candump log as the daemon reads it, and a fault's cycles through the loops again."""
 
 from __future__ import annotations
 
@@ -8,22 +8,28 @@ from typing import TYPE_CHECKING, Any
 
 from canhelm.errors import ConfigError, UsageError
 from daemon.cli.output import Json, say, show, words
+from daemon.runs.store import PROFILE, RECORDS
 from drivers.bus.candump import LogFrame, parse_line
 
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from profiles.schema import Profile
+
 TERMINAL_COLUMNS = ("time_s", "x_m", "y_m", "yaw_deg")
 
 
-def replay(file: Path, /, *, profile: str = "max2d", every: float = 0.1, json: Json = None) -> None:
+def replay(file: Path, /, *, profile: str | None = None, every: float = 0.1, json: Json = None) -> int:
     """Decode a candump log as the daemon of a robot would: odometry, speeds, currents, headings, what nodes reported.
+
+    Of the `records.jsonl` of a fault it computes the commands again, from what was measured, and shows the first that
+    differs; then it ends with 1.
 
     Example: `canhelm replay ~/.local/state/canhelm/max2d/runs/0001/frames.log --json`
 
     Args:
-        file: A log as `candump -L`, `canhelm run --record` and runs have it.
-        profile: The robot whose log it is.
+        file: A log as `candump -L`, `canhelm run --record` and runs have it, or the `records.jsonl` of a fault.
+        profile: The robot whose log it is; the default is max2d, and for a fault the profile beside it.
         every: Least time between two rows in seconds; 0 for one a SYNC.
     """
     from daemon.replay import replay as decode
@@ -32,17 +38,36 @@ def replay(file: Path, /, *, profile: str = "max2d", every: float = 0.1, json: J
 
     if not every >= 0.0:
         raise UsageError(f"--every {every:g} is no time", remedy="give seconds, 0 for every SYNC")
-    robot = load(profile).profile
+    records = file.name == RECORDS
+    robot = load(profile or (str(file.with_name(PROFILE)) if records else "max2d")).profile
     if robot.bricks:
         raise UsageError(
             f"robot {robot.name} has a brick, of which a log of CAN says nothing",
-            value=profile,
+            value=robot.name,
             remedy="name the robot whose log it is, by --profile; `canhelm plot` draws a run of this one",
         )
+    if records:
+        return _compute_again(robot, file, json)
     replayed = run_virtual(decode(robot, _frames(file), every))
     say(f"{replayed.frames} frames, of which the daemon reads {replayed.read}; {replayed.malformed} malformed")
     rows = sorted([*replayed.rows, *replayed.events], key=lambda row: float(row["time_s"]))
     show(rows, _table, json)
+    return 0
+
+
+def _compute_again(robot: Profile, file: Path, json: Json) -> int:
+    from daemon.recompute import recompute
+    from daemon.runtime.clock import run_virtual
+
+    try:
+        lines = file.read_bytes().splitlines()
+    except OSError as error:
+        raise UsageError(f"cannot read {file}: {error.strerror}", remedy="name the file of a fault's run") from error
+    found = run_virtual(recompute(robot, lines))
+    say(f"{found.cycles} cycles with a motion computed again; {found.left_out} others could not be")
+    say("the first difference follows" if found.difference else "all commands are as they were recorded")
+    show({"cycles": found.cycles, "left_out": found.left_out, "difference": found.difference}, json=json)
+    return 1 if found.difference else 0
 
 
 def _frames(file: Path) -> Iterator[LogFrame]:

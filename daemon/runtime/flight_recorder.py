@@ -91,7 +91,7 @@ class FlightRecorder:
             "measurement": measurement,
             "command": supervisor.command,
             "limits": supervisor.active_limits,
-            "motions": [{**_name(motion), "terms": motion.terms} for motion in supervisor.motions.values()],
+            "motions": [_step(motion) for motion in supervisor.motions.values()],
         }
         self._newest.cycles += f"{now_s:.4f},{row}\n".encode()
         self._newest.records += self._encode(record) + b"\n"
@@ -115,3 +115,8 @@ class FlightRecorder:
 
 def _name(motion: Motion) -> dict[str, Any]:
     return {"motion": motion.identity, "kind": motion.kind}
+
+
+def _step(motion: Motion) -> dict[str, Any]:
+    stepped = motion.running and not motion.ended.done()
+    return {**_name(motion), "running": stepped, "stop_reason": motion.stop_reason, "terms": motion.terms}
