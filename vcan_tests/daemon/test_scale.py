@@ -12,7 +12,7 @@ from canhelm.errors import Refused
 from daemon.commissioning.scale import square, straight
 from profiles.loader import load
 from profiles.side_file import write_values
-from vcan_tests.daemon.test_commissioning import Workshop, robot_file, workshop
+from vcan_tests.daemon.workshop import Workshop, robot_file, workshop
 
 TURTLE = "schema_version: 1\nname: lab1\nextends: robots/turtle\n"
 THIN = "\n".join(f"  wheel_{number}: {{wheel_radius_m: 0.048}}" for number in (1, 2, 3))
