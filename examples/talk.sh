@@ -2,6 +2,7 @@
 # Drives a robot from the shell: JSON-RPC over the daemon's socket, by socat. No canhelm is needed here.
 # Start a daemon first (`canhelm run --simulate --profile max2d`), then `examples/talk.sh SOCKET`.
 set -eu
+[ $# -eq 1 ] || { echo "usage: $0 SOCKET (\`canhelm doctor\` says where it is)" >&2; exit 2; }
 
 coproc daemon { socat - "UNIX-CONNECT:$1"; }
 

@@ -87,6 +87,12 @@ def test_the_loop_of_ones_own_drives_its_way_at_100_hz(max2d: Bench) -> None:
     assert SLOWEST_HZ < float(rate_hz[1]) < 101
 
 
+def test_the_shells_program_says_how_it_is_called() -> None:
+    called = subprocess.run(["examples/talk.sh"], cwd=ROOT, capture_output=True, text=True, timeout=TIMEOUT_S)
+    assert called.returncode == 2
+    assert called.stderr.startswith("usage: examples/talk.sh SOCKET")
+
+
 def test_the_bridge_drives_arcs_as_twists_ask_and_tells_where_the_robot_is(max2d: Bench) -> None:
     before = place(max2d)
     said = run(max2d, "-m", "vcan_tests.fake_ros", "examples/ros2_bridge.py", typed=TWISTS.strip())

@@ -20,9 +20,10 @@ class Mecanum(OwnVehicle):
 
     def __init__(self, given: Mapping[str, float], limits: Limits) -> None:
         super().__init__(given, limits)
+        wrong = [f"{name} is {given[name]:g}" for name in self.parameters if not given[name] > 0]
+        if wrong:
+            raise ValueError(f"{', '.join(wrong)}, and has to be above 0")
         self.arm_m = given["half_length_m"] + given["half_width_m"]
-        if self.arm_m <= 0:
-            raise ValueError("half_length_m and half_width_m add up to nothing")
 
     def step(self, measurement: Measurement, target: Twist | None, dt_s: float) -> Command:
         """The wheels' speeds for the target; the gate makes ramps of them."""

@@ -105,3 +105,10 @@ def test_an_unknown_number_is_told_with_the_one_that_was_meant(folder: Path) -> 
     (mistake,) = mistakes(folder, "parameters: {half_lenght_m: 3}")
     told = "robot.yaml:4: vehicle.parameters.half_lenght_m: is a number that mecanum:Mecanum does not know"
     assert mistake == f"{told}; did you mean half_length_m?"
+
+
+def test_the_example_refuses_a_length_that_makes_no_sense(folder: Path) -> None:
+    (mistake,) = mistakes(folder, "parameters: {half_width_m: -0.15}")
+    assert mistake.endswith(
+        "are refused by mecanum:Mecanum: half_width_m is -0.15, and has to be above 0; correct them"
+    )
