@@ -12,3 +12,5 @@ class PlausibilityConfig(Part, frozen=True, kw_only=True):
     """Between two readings of an encoder, beyond twice the way at its axis' fastest turning; None: 1 and two counts."""
     encoder_off_deg: Positive | None = None
     """Between what an encoder and the wheels of its axis have turned, beyond 30 % of that; None: as much as a jump."""
+    wheel_off_m: Positive | None = None
+    """What wheels at rest may roll otherwise than any motion of the body; None: a cycle at `wheel_speed_m_s`."""

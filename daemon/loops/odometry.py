@@ -81,24 +81,30 @@ class Odometry:
         return self.pose
 
     def _body_motion(self, heading_rad: PerPair, rolled_m: list[float], turned_rad: list[float]) -> Row:
-        """The twist (dx, dy, dyaw) at the mean headings.
-
-        A point (x, y) moves along a heading p by (cos p, sin p, x sin p - y cos p) times the twist, and to its left by
-        (-sin p, cos p, x cos p + y sin p) times it; the contact points of ``daemon.loops.geometry`` are put in.
-        """
-        geometry, offset = self._geometry, self._geometry.contact_offset_m
-        rows: list[Row] = []
+        """The twist (dx, dy, dyaw) at the mean headings."""
+        offset_m = self._geometry.contact_offset_m
         values: list[float] = []
-        for pair, end in ((REAR, -1.0), (FRONT, 1.0)):
-            cos, sin = math.cos(heading_rad[pair]), math.sin(heading_rad[pair])
-            axis_m = end * geometry.wheelbase_m / 2
-            arm_m = geometry.pivot_track_m / 2 * cos + offset
-            for wheel in WHEELS_OF_PAIR[pair]:
-                rows.append((cos, sin, axis_m * sin + TURN_SIGN[wheel] * arm_m))
-                values.append(rolled_m[wheel] - TURN_SIGN[wheel] * offset * turned_rad[pair])
-            rows.append((-sin, cos, axis_m * cos + end * geometry.contact_lead_m))
+        for pair in (REAR, FRONT):
+            turned_m = offset_m * turned_rad[pair]
+            values.extend(rolled_m[wheel] - TURN_SIGN[wheel] * turned_m for wheel in WHEELS_OF_PAIR[pair])
             values.append(0.0)
-        return least_squares(rows, values)
+        return least_squares(body_rows(self._geometry, heading_rad), values)
+
+
+def body_rows(geometry: PairedSteerGeometry, heading_rad: PerPair) -> list[Row]:
+    """What a twist of the body makes of each pair: the ways of its two wheels, and the way of its middle to the side.
+
+    A point (x, y) moves along a heading p by (cos p, sin p, x sin p - y cos p) times the twist, and to its left by
+    (-sin p, cos p, x cos p + y sin p) times it; the contact points of ``daemon.loops.geometry`` are put in.
+    """
+    rows: list[Row] = []
+    for pair, end in ((REAR, -1.0), (FRONT, 1.0)):
+        cos, sin = math.cos(heading_rad[pair]), math.sin(heading_rad[pair])
+        axis_m = end * geometry.wheelbase_m / 2
+        arm_m = geometry.pivot_track_m / 2 * cos + geometry.contact_offset_m
+        rows.extend((cos, sin, axis_m * sin + TURN_SIGN[wheel] * arm_m) for wheel in WHEELS_OF_PAIR[pair])
+        rows.append((-sin, cos, axis_m * cos + end * geometry.contact_lead_m))
+    return rows
 
 
 def least_squares(rows: list[Row], values: list[float]) -> Row:

@@ -8,8 +8,9 @@ from canhelm.errors import DeviceFault
 from daemon.loops.measurement import Command, Measurement
 from daemon.loops.plausibility import AxisTurning, EncoderJumps, Turning
 from daemon.loops.plausibility_limits import encoder_rates_rad_s, jump_margins_rad, steered_axes, turning_limits_rad
+from daemon.loops.wheels_and_body import WheelsAndBody, rows_of, wheel_limit_m, wheels_of
 from daemon.runtime.vehicle import Vehicle
-from drivers.contract import Fault
+from drivers.contract import Device, Fault
 
 _TURNS = {
     Turning.STANDS: "stands while its wheels turn its axis",
@@ -25,6 +26,8 @@ _JUMP_REMEDY = (
     "check the encoder's coupling, cable and shield; before the reset, compare `canhelm encoder status` with where the "
     "wheels point"
 )
+
+_WHEEL_REMEDY = "is the wheel blocked, does it slip, or is its belt off? else check the motor's encoder and cable"
 
 
 class Plausibility:
@@ -42,6 +45,8 @@ class Plausibility:
         self._jumps = EncoderJumps(rates_rad_s, jump_margins_rad(profile, names), 1.0 / profile.network.cycle_hz)
         limits_rad = turning_limits_rad(profile, names)
         self._axes = tuple((axis, AxisTurning(limits_rad[axis.encoder])) for axis in steered_axes(profile))
+        self._profile, self._drives = profile, vehicle.drives
+        self._body = WheelsAndBody(wheel_limit_m(profile))
 
     def look(
         self, measurement: Measurement, command: Command, dt_s: float, *, powered: bool, driving: bool
@@ -61,8 +66,9 @@ class Plausibility:
             measurement.heading_rad[: len(self._encoders)], [encoder.reading_time_s for encoder in self._encoders]
         )
         if jump:
-            return self._fault(jump.index, "jumped", jump.value, jump.limit, _JUMP_REMEDY)
-        return self._turned(measurement, command, dt_s, powered and driving)
+            return self._off(jump.index, "jumped", jump.value, jump.limit, _JUMP_REMEDY)
+        driving = powered and driving
+        return self._turned(measurement, command, dt_s, driving) or self._rolled(measurement, command, dt_s, driving)
 
     def _turned(self, measurement: Measurement, command: Command, dt_s: float, driving: bool) -> DeviceFault | None:
         """The first axis that turns otherwise than its wheels turn it."""
@@ -76,14 +82,35 @@ class Plausibility:
             found = check.look(heading, axis.angle(measurement.wheel_travel_m), commanded)
             if found:
                 how, value, limit = found
-                return self._fault(axis.encoder, _TURNS[how], value, limit, _TURN_REMEDIES[how])
+                return self._off(axis.encoder, _TURNS[how], value, limit, _TURN_REMEDIES[how])
         return None
 
-    def _fault(self, index: int, does: str, off_rad: float, limit_rad: float, remedy: str) -> DeviceFault:
-        """A fault of an encoder that is off by an angle; it stays the encoder's until the reset."""
+    def _rolled(self, measurement: Measurement, command: Command, dt_s: float, driving: bool) -> DeviceFault | None:
+        """The wheel that rolls otherwise than the body can move above it; a pair that is being turned is left out."""
+        if not (driving and all(measurement.brake_engaged)):
+            self._body.begin_anew()
+            return None
+        rows = rows_of(self._profile, measurement.heading_rad)
+        if not rows:
+            return None
+        wheels = wheels_of(self._profile)
+        commanded_m_s = command.wheel_speed_m_s[:wheels]
+        found = self._body.look(rows, measurement.wheel_travel_m[:wheels], commanded_m_s, dt_s)
+        if found is None:
+            return None
+        drive, off, limit = self._drives[found.index], round(found.value, 4), round(found.limit, 4)
+        told = f"node {drive.node} ({drive.name}) rolls otherwise than the body moves: the wheels are off by {off:g} m"
+        return _fault(drive, f"{told}, at most {limit:g} m can be true", off, limit, _WHEEL_REMEDY)
+
+    def _off(self, index: int, does: str, off_rad: float, limit_rad: float, remedy: str) -> DeviceFault:
+        """A fault of an encoder that is off by an angle."""
         encoder = self._encoders[index]
-        node, name = encoder.node, encoder.name
         value, limit = round(math.degrees(off_rad), 2), round(math.degrees(limit_rad), 2)
-        told = f"the encoder of node {node} ({name}) {does}: off by {value:g} deg, at most {limit:g} deg can be true"
-        encoder.fault = Fault(name, node or 0, 0, told, remedy)
-        return DeviceFault(told, node=node, value=value, limit=limit, remedy=remedy)
+        told = f"the encoder of node {encoder.node} ({encoder.name}) {does}: off by {value:g} deg"
+        return _fault(encoder, f"{told}, at most {limit:g} deg can be true", value, limit, remedy)
+
+
+def _fault(device: Device, told: str, value: float, limit: float, remedy: str) -> DeviceFault:
+    """A device's fault, and its own until the reset."""
+    device.fault = Fault(device.name, device.node or 0, 0, told, remedy)
+    return DeviceFault(told, node=device.node, value=value, limit=limit, remedy=remedy)

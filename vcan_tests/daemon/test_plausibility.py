@@ -10,10 +10,11 @@ import msgspec
 import pytest
 
 from canhelm.errors import CanhelmError, DeviceFault
-from daemon import demo_ackermann, demo_semitrailer
+from daemon import demo_ackermann, demo_max2d_path, demo_semitrailer
 from daemon.demo import FIGURES, Demo
 from daemon.loops.plausibility import AxisTurning, EncoderJumps, SteeredBy, Turning
 from daemon.loops.plausibility_limits import encoder_rates_rad_s, jump_margins_rad, steered_axes, turning_limits_rad
+from daemon.loops.wheels_and_body import wheel_limit_m
 from daemon.runtime.clock import run_virtual
 from profiles.loader import load
 from profiles.plausibility import PlausibilityConfig
@@ -258,12 +259,17 @@ def halved(name: str) -> Profile:
     off_deg, jump_deg = (
         0.5 * math.degrees(min(limits(profile, encoders))) for limits in (turning_limits_rad, jump_margins_rad)
     )
-    config = PlausibilityConfig(encoder_jump_deg=jump_deg, encoder_off_deg=off_deg)
+    wheel_m = 0.5 * wheel_limit_m(profile)
+    config = PlausibilityConfig(encoder_jump_deg=jump_deg, encoder_off_deg=off_deg, wheel_off_m=wheel_m)
     return msgspec.structs.replace(profile, plausibility=config)
 
 
 def test_max2d_drives_its_figures_in_peace_with_half_the_limits() -> None:
     assert len(run_virtual(Demo(halved("max2d"), 5, None, lambda _: None).run(FIGURES))) == len(FIGURES)
+
+
+def test_max2d_follows_its_path_in_peace_with_half_the_limits() -> None:
+    assert run_virtual(demo_max2d_path.drive(halved("max2d"), 5, None, lambda _: None)).numbers
 
 
 @pytest.mark.parametrize("step", demo_ackermann.FIGURES, ids=lambda step: str(step.identity))
