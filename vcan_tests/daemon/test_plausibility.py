@@ -282,3 +282,18 @@ def test_the_car_drives_its_steps_in_peace_with_half_the_limits(step: demo_acker
 def test_the_semitrailer_follows_its_paths_in_peace_with_half_the_limits(figure: demo_semitrailer.Manoeuvre) -> None:
     result = run_virtual(demo_semitrailer.drive(halved("semitrailer"), figure, 5, None, lambda _: None))
     assert result.numbers["achieved"]
+
+
+# A battery near its end
+
+
+async def test_under_voltage_of_any_drive_stops_the_robot_by_name() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        driving = _begin(robot, "drive.parallel", angle_deg=0.0, speed_m_s=0.4, duration_s=10.0)
+        await robot.until(lambda: robot.speed_m_s > 0.3)
+        await robot.call("simulation.fault", kind="emcy", part="rear_left", code=0x3220)
+        assert await _time_to_fault(robot) <= CYCLES_TO_NOTICE * PERIOD_S + 1e-6
+        error = await driving
+        assert isinstance(error, DeviceFault)
+        assert "node 2 (rear_left) reports under-voltage" in error.message
+        assert error.value == 0x3220
