@@ -240,7 +240,7 @@ class Connection(asyncio.Protocol):
         if own is not None:
             return await own(params)
         handed_over = params.get("wait") is False
-        lease = self._held_lease() if method.needs_lease and not handed_over else None
+        lease = self._held_lease() if method.needs_lease and not handed_over else self._lease_beside(method)
         return await self._server.backend.call(method.name, params, lease)
 
     def _answer(self, request_id: int | str | None, code: int, error: CanhelmError) -> None:
@@ -261,6 +261,10 @@ class Connection(asyncio.Protocol):
         if self._lease is None:
             self._lease = backend.open_lease(self._name)
         return self._lease
+
+    def _lease_beside(self, method: Method) -> str | None:
+        """The lease that this connection happens to have, for what needs none but may belong to its setup."""
+        return None if method.needs_lease else self._lease
 
     async def _renew(self, params: dict[str, Any]) -> dict[str, Any]:
         if self._lease is not None:

@@ -10,6 +10,7 @@ from daemon.api.gamepad_methods import GAMEPAD_METHODS
 from daemon.api.localisation_methods import LOCALISATION_METHODS
 from daemon.api.nxt_methods import NXT_METHODS
 from daemon.api.parameters import REQUIRED, Method, Param, Role
+from daemon.api.setup_methods import SETUP_METHODS
 from daemon.api.simulation_methods import SIMULATION_METHODS
 
 _NODE = Param("node", "node", "node id, or name from the profile")
@@ -387,6 +388,7 @@ METHODS: dict[str, Method] = {
         *NXT_METHODS,
         *LOCALISATION_METHODS,
         *ENCODER_METHODS,
+        *SETUP_METHODS,
         *GAMEPAD_METHODS,
         *SIMULATION_METHODS,
     )

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 from cyclopts.validators import Number
 
 from canhelm.aio import Client
+from canhelm.errors import CanhelmError, DaemonNotRunning
+from canhelm.protocol import RENEW_PERIOD_S
 from daemon.cli.motion import INTERRUPTED
 from daemon.cli.options import DEFAULT, Options
 from daemon.cli.output import say, say_warning, show
@@ -20,6 +25,8 @@ if TYPE_CHECKING:
     from profiles.loader import LoadedProfile
 
 Current = Annotated[int, Parameter(validator=Number(gte=50, lte=5000), help="Highest current meanwhile [mA].")]
+
+BREAKING_OFF = (signal.SIGTERM, signal.SIGHUP)
 
 
 def setup(what: str = "all", /, *, current: Current = 500, options: Options = DEFAULT) -> int:
@@ -34,7 +41,7 @@ def setup(what: str = "all", /, *, current: Current = 500, options: Options = DE
     """
     try:
         return asyncio.run(_setup(what, current, Terminal(), options))
-    except (EOFError, KeyboardInterrupt):
+    except (EOFError, KeyboardInterrupt, asyncio.CancelledError):
         say("broken off: the drives are as they were, and the profile, too")
         return INTERRUPTED
 
@@ -42,9 +49,11 @@ def setup(what: str = "all", /, *, current: Current = 500, options: Options = DE
 async def _setup(what: str, current_ma: int, person: Terminal, options: Options) -> int:
     from daemon.commissioning.session import changes_of, commission
 
-    async with Client(options.socket, options.robot) as daemon:
-        loaded = own_profile(await daemon.status())
-        findings = await commission(daemon, person, loaded.profile, what, current_ma)
+    async with Client(options.socket, options.robot) as client:
+        loaded = own_profile(await client.status())
+        with _signals_break_off():
+            async with HeldDaemon(client) as daemon:
+                findings = await commission(daemon, person, loaded.profile, what, current_ma)
     changes = changes_of(loaded.profile, findings.values)
     show(_result(findings, changes), _told, options.json)
     if findings.unsolved:
@@ -55,6 +64,61 @@ async def _setup(what: str, current_ma: int, person: Terminal, options: Options)
     if changes:
         await write_changes(loaded, findings.values, person)
     return 0
+
+
+@contextmanager
+def _signals_break_off() -> Iterator[None]:
+    """SIGTERM, and SIGHUP where the terminal is gone, do as Ctrl-C does."""
+    loop, task = asyncio.get_running_loop(), asyncio.current_task()
+    assert task is not None
+    for number in BREAKING_OFF:
+        loop.add_signal_handler(number, task.cancel)
+    try:
+        yield
+    finally:
+        for number in BREAKING_OFF:
+            loop.remove_signal_handler(number)
+
+
+class HeldDaemon:
+    """The daemon, told twice a second that the setup goes on; nothing is asked of it once it has given that up.
+
+    Use as ``async with HeldDaemon(client) as daemon``.
+    """
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+        self._renewing: asyncio.Task[None]
+
+    async def __aenter__(self) -> HeldDaemon:
+        self._renewing = asyncio.create_task(self._renew())
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        self._renewing.cancel()
+        await asyncio.wait([self._renewing])
+
+    async def _renew(self) -> None:
+        """Ends at the first refusal, which the next call then meets by itself."""
+        with suppress(CanhelmError):
+            while True:
+                await asyncio.sleep(RENEW_PERIOD_S)
+                await self._client.call("lease.renew")
+
+    async def call(self, method: str, /, **params: Any) -> dict[str, Any]:
+        """Call a method.
+
+        Raises:
+            Refused: the setup is over for the daemon: this program stood still, and its lease ran out.
+            DaemonNotRunning: the daemon has gone, and could not put the limits back if it was killed.
+        """
+        try:
+            if method != "stop":
+                await self._client.call("lease.renew")
+            return await self._client.call(method, **params)
+        except DaemonNotRunning as error:
+            remedy = "start it again: it writes the profile's limits into every drive before it is ready"
+            raise DaemonNotRunning(f"{error.message}: current limits may still be lowered", remedy=remedy) from None
 
 
 def _result(findings: Findings, changes: dict[str, tuple[Any, Any]]) -> dict[str, Any]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Coroutine, Mapping, Sequence
+from collections.abc import AsyncIterator, Coroutine, Sequence
 from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any
 
-from canhelm.errors import CanhelmError, NodeAbsent, Refused
-from daemon.commissioning.dialogue import Daemon, Person, agrees, preview, told
+from canhelm.errors import NodeAbsent, Refused
+from daemon.commissioning.dialogue import Daemon, Person, agrees, preview
 from daemon.commissioning.holding import holding_brakes, look_at_holding_brake
 from daemon.commissioning.pairs import Push, follow_swapped_wheels, judge_brakes, judge_encoders, push_pairs, turn_axes
 from daemon.commissioning.steered import judge_axle, look_at_axle, steered_axle
@@ -71,6 +71,7 @@ async def commission(daemon: Daemon, person: Person, profile: Profile, what: str
     findings, chosen = Findings(), chosen_wheels(profile, what)
     if not await agrees(person, "do all wheels hang in the air, and is everybody clear of them?"):
         raise GivenUp("nothing was changed", remedy="lift the robot first")
+    await daemon.call("setup.begin")
     try:
         await daemon.call("brake.engage", pair=ALL)
         axle = chosen_axle(profile, what)
@@ -142,14 +143,12 @@ async def capped(daemon: Daemon, person: Person, drives: Sequence[str], current_
             person.tell(line)
         if not await agrees(person, "write them?"):
             raise GivenUp("nothing was changed", remedy="begin again with another --current")
-    written: dict[tuple[str, str], int] = {}
     try:
-        for (drive, name), old in lowered.items():
-            written[drive, name] = old
-            await daemon.call("sdo.write", node=drive, object=name, value=current_ma)
+        for drive in dict.fromkeys(drive for drive, _ in lowered):
+            await daemon.call("setup.lower", node=drive, current_ma=current_ma)
         yield
     finally:
-        await to_its_end(_put_back(daemon, person, written))
+        await to_its_end(_put_back(daemon, person, told_of=bool(lowered)))
 
 
 async def to_its_end(tidying: Coroutine[Any, Any, None]) -> None:
@@ -165,17 +164,16 @@ async def to_its_end(tidying: Coroutine[Any, Any, None]) -> None:
 async def _leave_safe(daemon: Daemon) -> None:
     await daemon.call("stop")
     await daemon.call("brake.engage", pair=ALL)
+    await daemon.call("setup.end")
 
 
-async def _put_back(daemon: Daemon, person: Person, written: Mapping[tuple[str, str], int]) -> None:
-    """One drive that cannot be reached keeps none of the others from getting its limits back."""
+async def _put_back(daemon: Daemon, person: Person, *, told_of: bool) -> None:
+    """The daemon keeps what the limits were; it puts them back without being asked where nobody asks any more."""
     await daemon.call("stop")
-    for (drive, name), old in written.items():
-        try:
-            await daemon.call("sdo.write", node=drive, object=name, value=old)
-        except CanhelmError as error:
-            person.tell(f"{drive} keeps its lower {name} until it is started anew: {told(error)}")
-    if written:
+    trouble = (await daemon.call("setup.restore"))["trouble"]
+    for sentence in trouble:
+        person.tell(sentence)
+    if told_of and not trouble:
         person.tell("the drives have their current limits back")
 
 

@@ -18,11 +18,15 @@ from daemon.runtime.motor_commands import MotorCommands
 from daemon.runtime.network_commands import NetworkCommands
 from daemon.runtime.node_commands import NodeCommands
 from daemon.runtime.path_commands import PathCommands, PathVehicle
+from daemon.runtime.setup_commands import SetupCommands
 from daemon.runtime.simulation_commands import Network, SimulationCommands
 from daemon.runtime.supervisor import Supervisor
 from daemon.runtime.workshop_commands import Workshop, WorkshopCommands
 from drivers.contract import DriveState
 from drivers.simulated.faults import Faults
+
+OF_A_SETUP = ("motor.enable", "motor.reset", "brake.release")
+"""Methods without a motion that, while a setup is under way, are for its client alone."""
 
 
 class Commands:
@@ -57,6 +61,7 @@ class Commands:
             **BrakeCommands(supervisor).handlers,
             **BrickCommands(supervisor).handlers,
             **EncoderCommands(supervisor).handlers,
+            **SetupCommands(supervisor).handlers,
             **NetworkCommands(supervisor).handlers,
             **FrameCommands(supervisor.master.bus).handlers,
             **NodeCommands(supervisor).handlers,
@@ -95,6 +100,8 @@ class Commands:
             raise Refused(f"this vehicle has no {method}", remedy=f"motions that it has: {have}")
         if method in self._driving and not params.get("dry_run"):
             self._require_set_up()
+        if method in OF_A_SETUP:
+            self._supervisor.require_no_setup_of_others(lease)
         return await handler(params, lease)
 
     def _require_set_up(self) -> None:

@@ -15,7 +15,8 @@ BRAKE_OUTPUTS = (0x2078, 0x2079)
 
 
 def require_all_disabled(supervisor: Supervisor) -> None:
-    """Raise Interlock while any drive has power: neither network states nor objects are changed then."""
+    """Raise Interlock while a drive has power or a setup is under way: network states and objects stay as they are."""
+    supervisor.require_no_setup_of_others(None)
     if supervisor.powered:
         raise Interlock(
             "a drive is enabled: network states and objects are changed at rest, with every drive disabled",

@@ -8,11 +8,11 @@ from __future__ import annotations
 import asyncio
 import itertools
 import logging
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from functools import partial
 from typing import Any
 
-from canhelm.errors import CanhelmError, DeviceFault, Refused
+from canhelm.errors import CanhelmError, DeviceFault, Interlock, Refused
 from daemon.loops.measurement import Command, Measurement
 from daemon.runtime.events import EventLog
 from daemon.runtime.leases import Leases
@@ -44,6 +44,9 @@ class Supervisor:
         observers: called at the end of each control cycle.
         on_motion: called with each motion that was admitted, before it moves anything.
         remark: what is waited for where the profile has no device.
+        setup_lease: the lease of a setup under way, which has the robot to itself; None without one.
+        on_lease_end: called with each lease that is over, by hanging up or running out.
+        at_end: awaited when the daemon goes down, once the vehicle is at rest and off.
         stop, estop, fault, power_off, until_rest: those of :class:`daemon.runtime.stopping.Stopping`.
     """
 
@@ -61,11 +64,15 @@ class Supervisor:
         self.command = vehicle.zero
         self.bus_missing = ""
         self.remark = ""
+        self.setup_lease: str | None = None
+        self.on_lease_end: list[Callable[[str], None]] = []
+        self.at_end: list[Callable[[], Awaitable[object]]] = []
         self.observers: list[Callable[[], None]] = []
         self.on_motion: list[Callable[[Motion], None]] = []
         self._stale_s = master.network.late_after_cycles * period_s
         self._numbers = itertools.count(1)
         self._tasks = TaskSet(self._on_task_failure)
+        self.spawn = self._tasks.spawn
         self._watch = DeviceWatch(devices, period_s, master.bus, master.network.late_after_cycles)
         self._plausibility = Plausibility(vehicle)
         self._stopping = stopping = Stopping(devices, vehicle, self.motions, self._tasks, self.log, self._drop_targets)
@@ -139,14 +146,23 @@ class Supervisor:
         for name in drives:
             self.devices.drives[name].require_ready()
 
+    def require_no_setup_of_others(self, lease: str | None) -> None:
+        """Raise Interlock while a setup that is not held by this lease has the robot to itself."""
+        if self.setup_lease not in (None, lease):
+            raise Interlock(
+                "a setup is under way, and has the robot to itself",
+                remedy="wait for its end, or end it where it runs; `canhelm stop` works at any time",
+            )
+
     def admit(self, motion: Motion) -> None:
         """Let a motion begin.
 
         Raises:
             EmergencyStop, NodeAbsent, NotReady: as :meth:`require_ready`.
             Refused: its drives are busy, or its lease has run out.
-            Interlock: a brake stands against it.
+            Interlock: a brake stands against it, or somebody's setup.
         """
+        self.require_no_setup_of_others(motion.lease)
         self.require_ready(motion.drives)
         if motion.lease is not None:
             self.leases.client(motion.lease)
@@ -308,6 +324,8 @@ class Supervisor:
             if motion.lease == lease and not motion.stop_reason:
                 self.log.add("warning", "supervisor", f"motion {motion.identity} ({motion.kind}) stops: {reason}")
                 motion.stop(reason)
+        for told in self.on_lease_end:
+            told(lease)
 
     # --- the end -----------------------------------------------------------------------------------------------
 
@@ -329,6 +347,8 @@ class Supervisor:
             The drives that are not known to be at rest and off.
         """
         await self._stopping.close()
+        for finish in self.at_end:
+            await finish()
         await self._tasks.close()
         return self._stopping.doubtful
 

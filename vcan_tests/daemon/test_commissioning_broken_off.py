@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from canhelm.errors import Refused
 from daemon.commissioning.session import GivenUp, commission
 from daemon.commissioning.wheels import Findings
 from vcan_tests.daemon.workshop import Workshop, robot_file, workshop
@@ -40,6 +41,28 @@ async def test_breaking_off_puts_everything_back(tmp_path: Path) -> None:
         limits = {drive.dictionary.number("output_current_limit") for drive in shop.robot.network.drives.values()}
         assert limits == {5000}
         assert all(brake.engaged for brake in shop.robot.network.brakes.values())
+
+
+async def test_a_lease_that_runs_out_puts_everything_back_and_ends_the_setup(tmp_path: Path) -> None:
+    async with workshop(robot_file(tmp_path)) as shop:
+        limits = current_limits(shop)
+        await shop.call("setup.begin")
+        await shop.call("setup.lower", node="rear_left", current_ma=500)
+        assert current_limits(shop) != limits
+        await shop.robot.fall_silent()
+        await shop.robot.until(lambda: shop.robot.app.supervisor.setup_lease is None)
+        assert current_limits(shop) == limits
+        with pytest.raises(Refused, match="this setup is over"):
+            await shop.call("setup.lower", node="rear_left", current_ma=500)
+
+
+async def test_a_daemon_that_goes_down_meanwhile_puts_the_limits_back(tmp_path: Path) -> None:
+    async with workshop(robot_file(tmp_path)) as shop:
+        limits = current_limits(shop)
+        await shop.call("setup.begin")
+        await shop.call("setup.lower", node="rear_left", current_ma=500)
+        await shop.robot.app.supervisor.close()
+        assert current_limits(shop) == limits
 
 
 class Interrupted:

@@ -60,17 +60,24 @@ def test_a_reversed_wheel_is_found_and_written(miswired: Bench, tmp_path: Path) 
     assert load(tmp_path / "max2d.yaml").profile.drives["rear_left"].direction == -1
 
 
-@pytest.mark.real_time
-def test_ctrl_c_leaves_everything_as_it_was(miswired: Bench, tmp_path: Path) -> None:
-    person = Person(miswired, ["setup", "rear_left"])
+def jogged(bench: Bench) -> Person:
+    """A setup whose first wheel turns, with its limits lowered."""
+    person = Person(bench, ["setup", "rear_left"])
     for _ in range(2):
         person.reads_until(" [y/n] ")
         person.types("y")
     person.reads_until("Enter and watch ")
-    assert limit_ma(miswired) == 500
+    assert limit_ma(bench) == 500
     person.types("")
-    miswired.wait_for(lambda status: status["state"] == "active")
-    os.kill(person.process.pid, signal.SIGINT)
+    bench.wait_for(lambda status: status["state"] == "active")
+    return person
+
+
+@pytest.mark.real_time
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_leaves_everything_as_it_was(number: signal.Signals, miswired: Bench, tmp_path: Path) -> None:
+    person = jogged(miswired)
+    os.kill(person.process.pid, number)
     person.reads_until("broken off: the drives are as they were")
     person.process.communicate(timeout=30)
     assert person.process.returncode == 130
@@ -82,6 +89,50 @@ def test_ctrl_c_leaves_everything_as_it_was(miswired: Bench, tmp_path: Path) -> 
 def limit_ma(bench: Bench) -> int:
     """The output current limit of the rear left drive."""
     return int(bench.client.call("sdo.read", node="rear_left", object="output_current_limit")["value"])
+
+
+@pytest.mark.real_time
+def test_the_daemon_puts_the_limits_back_when_the_setup_is_killed(miswired: Bench) -> None:
+    person = jogged(miswired)
+    person.process.kill()
+    person.process.communicate(timeout=30)
+    miswired.wait_for(lambda status: any("the setup was broken off" in event["message"] for event in status["events"]))
+    assert (limit_ma(miswired), miswired.status()["state"]) == (5000, "idle")
+    assert miswired.canhelm("motor", "enable", "rear_left").returncode == 0
+
+
+@pytest.mark.real_time
+def test_a_daemon_that_is_killed_meanwhile_is_told_with_what_to_do(miswired: Bench) -> None:
+    person = jogged(miswired)
+    miswired.process.kill()
+    person.reads_until("current limits may still be lowered")
+    person.process.communicate(timeout=30)
+    assert person.process.returncode == 3
+
+
+@pytest.mark.real_time
+def test_meanwhile_others_may_only_look_and_stop(miswired: Bench) -> None:
+    person = Person(miswired, ["setup", "rear_left"])
+    for _ in range(2):
+        person.reads_until(" [y/n] ")
+        person.types("y")
+    person.reads_until("Enter and watch ")
+    for command in ("motor velocity front_left 100 --duration 1", "motor enable front_left", "brake release front"):
+        refused = miswired.canhelm(*command.split())
+        assert (command, refused.returncode) == (command, 6)
+        assert "a setup is under way" in refused.stderr
+    assert miswired.canhelm("sdo", "write", "front_left", "output_current_limit", "600").returncode == 6
+    assert miswired.canhelm("status").returncode == 0
+    assert miswired.canhelm("stop").returncode == 0
+    second = Person(miswired, ["setup", "front_left"])
+    second.reads_until(" [y/n] ")
+    second.types("y")
+    second.reads_until("a setup is under way")
+    second.process.communicate(timeout=30)
+    assert second.process.returncode == 6
+    os.kill(person.process.pid, signal.SIGINT)
+    person.process.communicate(timeout=30)
+    assert limit_ma(miswired) == 5000
 
 
 def test_without_a_terminal_nobody_is_asked(capsys: pytest.CaptureFixture[str]) -> None:
