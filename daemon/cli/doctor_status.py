@@ -31,8 +31,10 @@ def status_findings(status: Mapping[str, Any], earlier: Mapping[str, Any]) -> It
     """
     state = str(status.get("state"))
     stopped = state in ("fault", "estop")
-    sentence = f"{state}: {status['message']}" if status.get("message") else state
-    yield Finding("vehicle", "problem" if stopped else "ok", sentence, "canhelm reset" if stopped else "")
+    message = str(status.get("message") or state)
+    sentence = message if message.startswith(state) else f"{state}: {message}"
+    verdict = "problem" if stopped else "note" if state in STARTING else "ok"
+    yield Finding("vehicle", verdict, sentence, "canhelm reset" if stopped else "")
     yield from _setup_findings(status)
     nodes = status.get("nodes") or ()
     for node in nodes:

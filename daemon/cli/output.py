@@ -80,7 +80,7 @@ def words(value: Any, digits: int = 4) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        return f"{value:.{digits}g}"
+        return f"{value:.0f}" if 10**digits <= abs(value) < 1e12 else f"{value:.{digits}g}"
     if isinstance(value, Mapping):
         return ", ".join(f"{key} {words(item, digits)}" for key, item in value.items())
     if isinstance(value, list | tuple):

@@ -40,17 +40,19 @@ def setup(what: str = "all", /, *, current: Current = 500, options: Options = DE
         what: A wheel by its drive's name or node id, `pairs` for encoders and brakes of wheel pairs, or `all`.
     """
     try:
-        return asyncio.run(_setup(what, current, Terminal(), options))
+        return asyncio.run(_setup(what, current, options))
     except (EOFError, KeyboardInterrupt, asyncio.CancelledError):
         say("broken off: the drives are as they were, and the profile, too")
         return INTERRUPTED
 
 
-async def _setup(what: str, current_ma: int, person: Terminal, options: Options) -> int:
-    from daemon.commissioning.session import changes_of, commission
+async def _setup(what: str, current_ma: int, options: Options) -> int:
+    from daemon.commissioning.session import changes_of, chosen_wheels, commission
 
     async with Client(options.socket, options.robot) as client:
         loaded = own_profile(await client.status())
+        chosen_wheels(loaded.profile, what)
+        person = Terminal()
         with _signals_break_off():
             async with HeldDaemon(client) as daemon:
                 findings = await commission(daemon, person, loaded.profile, what, current_ma)

@@ -38,6 +38,11 @@ def findings(earlier: dict[str, Any] | None = None, **status: Any) -> dict[str, 
     return {finding.check: finding for finding in status_findings({"state": "idle", **status}, earlier or {})}
 
 
+def test_a_vehicle_that_waits_is_a_note_that_says_so_once() -> None:
+    vehicle = findings(state="waiting", message="waiting for node 3")["vehicle"]
+    assert (vehicle.verdict, vehicle.finding) == ("note", "waiting for node 3")
+
+
 def test_an_interface_that_is_down_is_brought_up(tmp_path: Path) -> None:
     found = interface_finding("can0", interface(tmp_path, flags="0x0"), CanLink(1_000_000))
     assert (found.verdict, "ip link set can0 up type can bitrate" in found.mend) == ("problem", True)

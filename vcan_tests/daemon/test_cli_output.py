@@ -119,6 +119,10 @@ def test_nested_values_are_words_for_people() -> None:
     assert words({"heading_deg": {"rear": 0.5}, "drives": ["a", "b"]}) == "heading_deg rear 0.5, drives a, b"
 
 
+def test_a_large_number_keeps_its_digits_for_people() -> None:
+    assert words([1795344000.25, 12345.6, 1234.5, 0.12345]) == "1795344000, 12346, 1234, 0.1235"
+
+
 def test_an_error_tells_the_limit_that_it_broke(capsys: pytest.CaptureFixture[str]) -> None:
     say_error(LimitExceeded("too fast", limit="2 m/s", remedy="ask for less"))
     assert capsys.readouterr().err == "canhelm: too fast (limit: 2 m/s) - ask for less\n"

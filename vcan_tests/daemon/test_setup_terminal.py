@@ -12,7 +12,6 @@ from typing import Any
 
 import pytest
 
-from daemon.cli.main import main
 from profiles.loader import load
 from vcan_tests.daemon.test_calibration import Person
 from vcan_tests.daemon.test_processes import PATIENT_PROFILE, Bench
@@ -135,6 +134,12 @@ def test_meanwhile_others_may_only_look_and_stop(miswired: Bench) -> None:
     assert limit_ma(miswired) == 5000
 
 
-def test_without_a_terminal_nobody_is_asked(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["setup", "--socket", "/nonexistent"]) == 2
-    assert "nobody is there to answer" in capsys.readouterr().err
+@pytest.mark.real_time
+@pytest.mark.parametrize(
+    ("what", "code", "told"), [("rear_left", 2, "nobody is there"), ("nosuch", 4, "no wheel nosuch")]
+)
+def test_without_a_terminal_nobody_is_asked_but_names_are_checked(
+    what: str, code: int, told: str, miswired: Bench
+) -> None:
+    refused = miswired.canhelm("setup", what)
+    assert (refused.returncode, told in refused.stderr) == (code, True)
