@@ -25,6 +25,10 @@ TWIN = ("advance", "moving", "pose", "velocity", "heading_rad", "set_brake")
 """What a twin has to have: drivers.simulated.body."""
 
 
+class ClassMissing(ImportError):
+    """The module is there, the class is not."""
+
+
 def load_class(name: str) -> type[Any]:
     """The class that a profile names as ``package.module:Class``.
 
@@ -34,7 +38,7 @@ def load_class(name: str) -> type[Any]:
     module, _, wanted = name.partition(":")
     found = getattr(importlib.import_module(module), wanted, None)
     if not inspect.isclass(found):
-        raise ImportError(f"{module} has no class {wanted}")
+        raise ClassMissing(f"names {name}: module {module} has no class {wanted}")
     return found
 
 
@@ -58,6 +62,8 @@ def _checked(name: str, key: str, needed: tuple[str, ...]) -> tuple[type[Any] | 
     path = ("vehicle", key)
     try:
         found = load_class(name)
+    except ClassMissing as error:
+        return None, [Finding(path, str(error), _classes_like(name, needed))]
     except ImportError as error:
         remedy = f"install it for {sys.executable}, or put the folder that it lies in on PYTHONPATH"
         return None, [Finding(path, f"{name} cannot be imported: {error}", remedy)]
@@ -71,6 +77,17 @@ def _checked(name: str, key: str, needed: tuple[str, ...]) -> tuple[type[Any] | 
     if lacking:
         return None, [Finding(path, f"{name} lacks {', '.join(lacking)}", "write them as docs/own-vehicle.md says")]
     return found, []
+
+
+def _classes_like(name: str, needed: tuple[str, ...]) -> str:
+    """What to write instead of a class that its module does not have."""
+    module = name.partition(":")[0]
+    own = [each for each in vars(sys.modules[module]).values() if inspect.isclass(each) and each.__module__ == module]
+    made = [each for each in own if not inspect.isabstract(each) and all(hasattr(each, part) for part in needed)]
+    fitting = [f"{module}:{each.__name__}" for each in made]
+    return (
+        f"it has {', '.join(fitting)}" if fitting else f"write it, or name another module: {module} has none that fits"
+    )
 
 
 def _counts(law: type[Any], vehicle: OwnGeometry) -> Iterator[Finding]:

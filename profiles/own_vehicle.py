@@ -8,7 +8,8 @@ from msgspec import Meta, field
 
 from profiles.parts import Name, Part
 
-ClassName = Annotated[str, Meta(pattern=r"^[A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*$")]
+CLASS_PATTERN = r"^[A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*$"
+ClassName = Annotated[str, Meta(pattern=CLASS_PATTERN)]
 """As package.module:Class."""
 
 

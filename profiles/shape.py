@@ -9,6 +9,7 @@ from typing import Any
 
 from msgspec import inspect
 
+from profiles.own_vehicle import CLASS_PATTERN
 from profiles.provenance import FieldPath, Listing, Mapping, Mistake, Node, Place, Scalar, dotted, plain
 
 _NUMBERS = {inspect.IntType: "a whole number", inspect.FloatType: "a number"}
@@ -116,7 +117,8 @@ def expected(kind: inspect.Type) -> str:
     if isinstance(kind, inspect.IntType | inspect.FloatType):
         return _NUMBERS[type(kind)] + _range(kind)
     if isinstance(kind, inspect.StrType):
-        return "a text" + (f" that matches {kind.pattern}" if kind.pattern else "")
+        forms = {CLASS_PATTERN: "module:Class, as mecanum:Mecanum"}
+        return forms.get(kind.pattern or "", "a text" + (f" that matches {kind.pattern}" if kind.pattern else ""))
     if isinstance(kind, inspect.TupleType):
         return f"a list of {len(kind.item_types)}"
     if isinstance(kind, inspect.VarTupleType):

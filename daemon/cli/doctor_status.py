@@ -33,8 +33,10 @@ def status_findings(status: Mapping[str, Any], earlier: Mapping[str, Any]) -> It
     stopped = state in ("fault", "estop")
     message = str(status.get("message") or state)
     sentence = message if message.startswith(state) else f"{state}: {message}"
-    verdict = "problem" if stopped else "note" if state in STARTING else "ok"
-    yield Finding("vehicle", verdict, sentence, "canhelm reset" if stopped else "")
+    if stopped:
+        yield Finding("vehicle", "problem", sentence, "canhelm reset")
+    else:
+        yield Finding("vehicle", "note" if state in STARTING else "ok", sentence)
     yield from _setup_findings(status)
     nodes = status.get("nodes") or ()
     for node in nodes:

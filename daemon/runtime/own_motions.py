@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
 import math
+import traceback
 from typing import Any, Protocol
 
+from canhelm.errors import DeviceFault
 from daemon.loops.measurement import Command, Measurement
 from daemon.loops.odometry import Pose
 from daemon.loops.own_vehicle import OwnVehicle, Twist
@@ -12,6 +15,17 @@ from daemon.runtime.motions import Motion
 from daemon.runtime.poses import place_and_heading
 from daemon.runtime.rest import AT_REST_M_S
 from daemon.runtime.streams import Streamed
+
+MEND = "mend the class, then start the daemon anew; the traceback is in the log"
+
+
+def failure_of(law: OwnVehicle, method: str, error: Exception) -> str:
+    """What failed in a law of one's own: its class and method, the error, and the line of the class's file."""
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if frame.filename == inspect.getsourcefile(type(law))]
+    place = f" ({own[-1].filename}:{own[-1].lineno})" if own else ""
+    name = f"{type(law).__module__}:{type(law).__qualname__}"
+    return f"{method} of {name} failed: {type(error).__name__}: {error}{place}"
 
 
 class Senses(Protocol):
@@ -53,14 +67,21 @@ class OwnMotion(Motion):
             self.target = None
         self._remaining_s -= dt_s
         if self._senses.failure:
-            raise RuntimeError(self._senses.failure)
+            raise DeviceFault(self._senses.failure, remedy=MEND)
+        try:
+            command = self._commanded(measurement, dt_s)
+        except Exception as error:
+            raise DeviceFault(failure_of(self._law, "step", error), remedy=MEND) from error
+        if self.target is None and all(abs(speed) < AT_REST_M_S for speed in measurement.wheel_speed_m_s):
+            self.on_rest(measurement)
+        return command
+
+    def _commanded(self, measurement: Measurement, dt_s: float) -> Command:
         command = self._law.step(measurement, self.target, dt_s)
         if len(command.wheel_speed_m_s) != self._law.wheels:
             raise ValueError(f"{len(command.wheel_speed_m_s)} wheel speeds for {self._law.wheels} wheels")
         if len(command.release_brake) not in (0, self._law.brakes):
             raise ValueError(f"{len(command.release_brake)} brakes are commanded, there are {self._law.brakes}")
-        if self.target is None and all(abs(speed) < AT_REST_M_S for speed in measurement.wheel_speed_m_s):
-            self.on_rest(measurement)
         return command
 
     def on_rest(self, measurement: Measurement) -> None:

@@ -253,7 +253,8 @@ class Supervisor:
                 asked = motion.step(measurement, dt_s)
             except Exception as error:
                 LOGGER.exception("the law of motion %s failed", motion.identity)
-                self.fault(DeviceFault(f"the control law failed: {error}", remedy="report it with the log"))
+                defect = DeviceFault(f"the control law failed: {error}", remedy="report it with the log")
+                self.fault(error if isinstance(error, DeviceFault) else defect)
                 return self.vehicle.zero
             command = asked if command is self.vehicle.zero else _sum(command, asked)
         return command

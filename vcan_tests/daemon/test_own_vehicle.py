@@ -27,6 +27,10 @@ class Short(Mecanum):
         command = super().step(measurement, target, dt_s)
         return type(command)(command.wheel_speed_m_s[:3])
 
+class Boom(Mecanum):
+    def step(self, measurement, target, dt_s):
+        raise KeyError("boom")
+
 class Weightless(MecanumWorld):
     def __init__(self, profile, seed):
         super().__init__(profile, seed)
@@ -131,6 +135,14 @@ async def test_the_log_says_whose_code_runs_inside_the_daemon(
             pass
     told = f"mecanum:Mecanum of {EXAMPLE / 'mecanum.py'} runs inside this daemon, with all of its rights"
     assert any(record.getMessage() == told for record in caplog.records)
+
+
+async def test_a_law_that_raises_is_named_with_its_line_and_its_owner_mends_it(faulty: Profile) -> None:
+    told = r"step of faulty:Boom failed: KeyError: 'boom' \(.*faulty\.py:12\)"
+    async with running_robot(changed(faulty, kind="faulty:Boom"), expect_errors=True) as robot:
+        with pytest.raises(DeviceFault, match=told) as refused:
+            await robot.call("drive.parallel", angle_deg=0, speed_m_s=0.5, duration_s=1)
+        assert str(refused.value.remedy).startswith("mend the class")
 
 
 async def test_a_law_that_commands_too_few_wheels_stops_the_vehicle(faulty: Profile) -> None:
