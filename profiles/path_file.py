@@ -30,6 +30,8 @@ MAX_WAYPOINTS = 500
 _MAX_DEPTH = 6
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _PIECE = re.compile(r"pieces\[(\d+)\]")
+_EXPECTED = re.compile(r"Expected `(\w+)(?: \| null)?`([^`]*?)(?:, got `.*`)?")
+_KINDS = {"float": "a finite number", "array": "a list", "object": "a mapping", "str": "a text"}
 
 Point = tuple[float, float]
 E = TypeVar("E", bound=CanhelmError)
@@ -105,8 +107,11 @@ def find_path_file(name_or_path: str | Path) -> Path:
     shipped = SHIPPED / f"{text}.yaml"
     if shipped.is_file() and "/" not in text:
         return shipped
+    what = f"there is no path file {text}" if text else "the name of the path file is empty"
+    if text and os.path.isdir(text):
+        what = f"{text} is a directory, not a path file"
     known = ", ".join(sorted(path.stem for path in SHIPPED.glob("*.yaml")))
-    raise UsageError(f"there is no path file {text}", value=text, remedy=f"check it, or name a shipped one: {known}")
+    raise UsageError(what, value=text, remedy=f"check it, or name a shipped one: {known}")
 
 
 def load_path_file(name_or_path: str | Path) -> PathFile:
@@ -126,6 +131,9 @@ def load_path_file(name_or_path: str | Path) -> PathFile:
             data = _plain(root, 0)
         except RecursionError:
             raise _mistake(file, 1, "is nested too deeply", "give a mapping with a list of pieces") from None
+        except yaml.MarkedYAMLError as error:
+            line = error.problem_mark.line + 1 if error.problem_mark else 1
+            raise _mistake(file, line, str(error.problem), "remove one of them") from None
         try:
             spec = msgspec.convert(data, PathSpec)
         except msgspec.ValidationError as error:
@@ -144,6 +152,8 @@ def mistake_of(error: msgspec.ValidationError) -> tuple[str, str, str]:
     where = place.strip("`.")
     if where.endswith(".drive"):
         return where, what.replace("Invalid enum value", "is"), "write forward or backward"
+    if (kind := _EXPECTED.fullmatch(what)) and kind[1] in _KINDS:
+        return where, f"is not {_KINDS[kind[1]]}{kind[2]}", "docs/paths.md has the keys of a path"
     what = what.replace("`", "").replace("Object contains", "has an").replace("Object missing", "has no")
     return where, what, "docs/paths.md has the keys of a path"
 
@@ -199,7 +209,7 @@ def _plain(node: yaml.Node, depth: int) -> Any:
     if depth > _MAX_DEPTH:
         raise RecursionError
     if isinstance(node, yaml.MappingNode):
-        return {key.value: _plain(value, depth + 1) for key, value in node.value if isinstance(key, yaml.ScalarNode)}
+        return _mapping(node, depth)
     if isinstance(node, yaml.SequenceNode):
         return [_plain(item, depth + 1) for item in node.value]
     if isinstance(node, yaml.ScalarNode) and not node.style:
@@ -209,3 +219,15 @@ def _plain(node: yaml.Node, depth: int) -> Any:
             return node.value
         return number if math.isfinite(number) else node.value
     return node.value
+
+
+def _mapping(node: yaml.MappingNode, depth: int) -> dict[str, Any]:
+    """Raises yaml.MarkedYAMLError where a key stands twice."""
+    found: dict[str, Any] = {}
+    for key, value in node.value:
+        if not isinstance(key, yaml.ScalarNode):
+            continue
+        if key.value in found:
+            raise yaml.MarkedYAMLError(problem=f"key '{key.value}' stands here twice", problem_mark=key.start_mark)
+        found[key.value] = _plain(value, depth + 1)
+    return found

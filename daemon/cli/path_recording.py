@@ -14,7 +14,7 @@ from daemon.cli.motion import signals_interrupt
 from daemon.cli.options import Options
 from daemon.cli.output import say, say_warning, show
 from daemon.loops.odometry import Pose
-from daemon.loops.path import Piece
+from daemon.loops.path import Piece, wrap
 from daemon.loops.path_fitting import deviation, fit_pieces, split_runs
 from daemon.loops.record_smoothing import smoothed
 
@@ -155,7 +155,8 @@ def _path_lines(name: str, runs: list[Run]) -> Iterator[str]:
     """The path file, line by line."""
     first = runs[0].pieces[0]
     yield f"# Fitted to {Path(name).name}."
-    yield f"start: {{x_m: {first.x_m:.5f}, y_m: {first.y_m:.5f}, heading_deg: {math.degrees(first.heading(0.0)):.5f}}}"
+    heading_deg = math.degrees(wrap(first.heading(0.0)))
+    yield f"start: {{x_m: {first.x_m:.5f}, y_m: {first.y_m:.5f}, heading_deg: {heading_deg:.5f}}}"
     yield "pieces:"
     for number, run in enumerate(runs):
         begin = run.pieces[0]

@@ -97,6 +97,15 @@ def test_a_record_with_a_cusp_becomes_a_path_with_a_cusp(tmp_path: Path, capsys:
     assert back.from_m == pytest.approx((0.398, 0.0))
 
 
+def test_the_heading_of_a_fitted_path_is_within_half_a_turn(tmp_path: Path) -> None:
+    record = tmp_path / "way.csv"
+    record.write_text("\n".join(f"0,0,{step * 0.02},810,,," for step in range(51)))
+    assert main(["drive", "fit", str(record), str(tmp_path / "way.yaml")]) == 0
+    start = load_path_file(tmp_path / "way.yaml").spec.start
+    assert start is not None
+    assert start.heading_deg == pytest.approx(90.0, abs=0.1)
+
+
 @pytest.mark.parametrize("text", ["", "0,0,0,0,,,\n0,0,0,0,,,\n", "time\n", "0,1,x,0,,,\n", "0,1,inf,0,,,\n"])
 def test_what_is_no_record_is_refused(text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     record = tmp_path / "way.csv"

@@ -66,6 +66,23 @@ def test_a_length_is_a_positive_finite_number(tmp_path: Path, value: str) -> Non
     assert refusal(tmp_path, f"pieces: [{{line_m: {value}}}]").startswith("1: pieces[0].line_m")
 
 
+@pytest.mark.parametrize("value", [".nan", "abc"])
+def test_a_length_that_is_no_number_is_told_in_plain_words(tmp_path: Path, value: str) -> None:
+    told = refusal(tmp_path, f"pieces: [{{line_m: {value}}}]")
+    assert told.startswith("1: pieces[0].line_m: is not a finite number (")
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "key"),
+    [
+        ("pieces:\n  - {line_m: 1, line_m: 2}\n", 2, "line_m"),
+        ("pieces: [{line_m: 1}]\nstart: {x_m: 1}\npieces: [{line_m: 2}]\n", 3, "pieces"),
+    ],
+)
+def test_a_key_that_stands_twice_is_refused_with_its_line(tmp_path: Path, text: str, line: int, key: str) -> None:
+    assert refusal(tmp_path, text) == f"{line}: key '{key}' stands here twice (remove one of them)"
+
+
 @pytest.mark.parametrize("text", ["", "pieces: []", "[]", "pieces:", "start: {x_m: 1}"])
 def test_an_empty_path_is_refused(tmp_path: Path, text: str) -> None:
     assert refusal(tmp_path, text).startswith("1: ")
@@ -88,6 +105,16 @@ def test_broken_yaml_is_a_mistake_like_others(tmp_path: Path, text: str) -> None
 def test_a_file_that_is_not_there_is_told_with_those_that_are_shipped() -> None:
     with pytest.raises(UsageError, match="park-parallel"):
         load_path_file("nowhere")
+
+
+def test_a_directory_is_told_to_be_one(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="is a directory, not a path file"):
+        load_path_file(tmp_path)
+
+
+def test_an_empty_name_is_told_to_be_empty() -> None:
+    with pytest.raises(UsageError, match="the name of the path file is empty"):
+        load_path_file("")
 
 
 def test_an_error_about_a_piece_gets_its_file_and_line(tmp_path: Path) -> None:
