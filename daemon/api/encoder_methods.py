@@ -18,8 +18,10 @@ ENCODER_METHODS = (
         (
             Param("pair", "string", "name of the encoder"),
             Param("store", "string", "where the zero is kept", default="device", choices=("device", "profile")),
+            Param("force", "boolean", "also where it stands far from its old zero", default=False),
         ),
-        "pair, store, position_before_counts, zero_before_counts, offset_before_counts, zero_counts, note",
+        "pair, store, heading_before_deg, position_before_counts, zero_before_counts, offset_before_counts, "
+        "zero_counts, note",
         Role.CONFIGURE,
     ),
 )

@@ -37,6 +37,7 @@ def zero(
     *,
     store: Literal["device", "profile"] = "device",
     yes: Annotated[bool, Parameter(negative=())] = False,
+    force: Annotated[bool, Parameter(negative=())] = False,
     options: Options = DEFAULT,
 ) -> None:
     """The pair stands straight now: make this heading 0. It asks first, and keeps the old value in the side file.
@@ -48,6 +49,7 @@ def zero(
     Args:
         store: Where the zero is kept: in the encoder, or in the profile's side file.
         yes: Do not ask.
+        force: Also where the pair stands more than 30 degrees from its old zero.
     """
     from profiles.side_file import write_values
 
@@ -56,7 +58,7 @@ def zero(
         if not (yes or agreed(f"does the {pair} pair stand straight ahead?")):
             say("nothing was changed")
             return
-        found = client.call("encoder.zero", pair=pair, store=store)
+        found = client.call("encoder.zero", pair=pair, store=store, force=force)
     show(found, json=options.json)
     old = found["zero_before_counts" if store == "profile" else "position_before_counts"]
     values: dict[tuple[str, ...], int] = {("encoders", pair, "zero_before_counts"): old}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from typing import Any
 
 from canhelm.errors import DeviceFault, Interlock, NodeAbsent, Timeout
@@ -18,6 +19,8 @@ from drivers.encoder.objects import OBJECTS
 STILL_S = 0.3
 """Time in which the position of a pair that is to be zeroed must not change."""
 STILL_COUNTS = 1
+FAR_DEG = 30.0
+"""A pair that stands farther than this from its old zero is probably not straight (assumed)."""
 RESTART_S = 10.0
 """Longest time that an encoder may take to be ready again."""
 
@@ -60,9 +63,13 @@ class EncoderCommands:
         encoder.require_ready()
         require_all_disabled(self._supervisor)
         counts = await self._still_counts(encoder)
+        heading_deg = math.degrees(encoder.heading_rad)
+        if abs(heading_deg) > FAR_DEG and not params["force"]:
+            self._refuse_far(encoder, heading_deg)
         old = {
             "pair": encoder.name,
             "store": params["store"],
+            "heading_before_deg": round(heading_deg, 1),
             "position_before_counts": counts,
             "zero_before_counts": encoder.config.zero_counts,
             "offset_before_counts": await encoder.sdo.read_int(OBJECTS["offset_value"]),
@@ -75,6 +82,16 @@ class EncoderCommands:
         await self._keep(encoder)
         kept = {"zero_counts": encoder.config.zero_counts, "position_counts": await self._position(encoder)}
         return {**old, **kept, **note}
+
+    def _refuse_far(self, encoder: Cia406Encoder, heading_deg: float) -> None:
+        brake = self._supervisor.devices.brakes.get(encoder.name)
+        state = f", with its brake {brake.state.value}" if brake is not None else ""
+        raise Interlock(
+            f"the {encoder.name} pair stands at {heading_deg:.1f} degrees by its old zero{state}: this would become 0",
+            node=encoder.node,
+            limit=f"{FAR_DEG:g} degrees without --force",
+            remedy="turn it straight with its brake released; or say --force where it stands straight now",
+        )
 
     async def _still_counts(self, encoder: Cia406Encoder) -> int:
         """The position of a pair at rest. Raises Interlock where it moves."""

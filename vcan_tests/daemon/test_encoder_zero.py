@@ -31,7 +31,7 @@ def heading_deg(robot: Robot) -> float:
 async def test_the_device_keeps_its_zero_over_a_power_off() -> None:
     async with running_robot(expect_errors=True) as robot:
         place(robot, 10.0)
-        told = await robot.call("encoder.zero", pair="front", store="device")
+        told = await robot.call("encoder.zero", pair="front", store="device", force=False)
         assert told["position_before_counts"] == 2048 + round(10.0 / 360.0 * 4096)
         assert abs(told["position_counts"] - 2048) <= 1
         robot.network.power_off("front")
@@ -45,23 +45,33 @@ async def test_the_device_keeps_its_zero_over_a_power_off() -> None:
 async def test_a_zero_for_the_profile_leaves_the_device_alone() -> None:
     async with running_robot() as robot:
         place(robot, 10.0)
-        told = await robot.call("encoder.zero", pair="front", store="profile")
+        told = await robot.call("encoder.zero", pair="front", store="profile", force=False)
         assert (told["zero_before_counts"], told["zero_counts"]) == (2048, 2048 + round(10.0 / 360.0 * 4096))
         assert (await robot.call("encoder.status", pair="front"))["encoders"][0]["offset_counts"] == 0
+
+
+async def test_a_pair_far_from_its_old_zero_is_zeroed_by_force_alone() -> None:
+    async with running_robot() as robot:
+        place(robot, 60.0)
+        await asyncio.sleep(0.1)
+        with pytest.raises(Interlock, match=r"stands at 60\.\d degrees by its old zero, with its brake engaged"):
+            await robot.call("encoder.zero", pair="front", store="profile", force=False)
+        told = await robot.call("encoder.zero", pair="front", store="profile", force=True)
+        assert told["heading_before_deg"] == pytest.approx(60.0, abs=0.2)
 
 
 async def test_a_pair_that_moves_is_not_zeroed() -> None:
     async with running_robot() as robot:
         asyncio.get_running_loop().call_later(0.1, lambda: place(robot, 3.0))
         with pytest.raises(Interlock, match="the front pair moves"):
-            await robot.call("encoder.zero", pair="front", store="device")
+            await robot.call("encoder.zero", pair="front", store="device", force=False)
 
 
 async def test_nothing_is_zeroed_while_a_drive_is_enabled() -> None:
     async with running_robot() as robot:
         await robot.call("motor.enable", node="rear_left")
         with pytest.raises(Interlock, match="a drive is enabled"):
-            await robot.call("encoder.zero", pair="front", store="device")
+            await robot.call("encoder.zero", pair="front", store="device", force=False)
 
 
 async def test_an_encoder_that_forgets_its_zero_is_found_out() -> None:
@@ -70,7 +80,7 @@ async def test_an_encoder_that_forgets_its_zero_is_found_out() -> None:
         memory = robot.network.encoders["front"].dictionary
         memory.actions[memory.address("save_all_parameters")] = lambda _: None
         with pytest.raises(DeviceFault, match="has forgotten its zero"):
-            await robot.call("encoder.zero", pair="front", store="device")
+            await robot.call("encoder.zero", pair="front", store="device", force=False)
 
 
 async def test_an_unknown_pair_is_told_with_those_that_there_are() -> None:

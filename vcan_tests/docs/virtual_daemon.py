@@ -121,6 +121,11 @@ class VirtualDaemon:
         finally:
             self._ready.set()
 
+    @property
+    def _held(self) -> str | None:
+        """The lease of a setup, whose client renews while its person looks and thinks."""
+        return self.app.supervisor.setup_lease
+
     async def _serve(self) -> None:
         await asyncio.sleep(self._begin_s)
         self.app = self._make_app()
@@ -135,7 +140,8 @@ class VirtualDaemon:
             for end in select.select([self._waiting, *self._clients], [], [], 0 if busy else None)[0]:
                 await self._hear(end, server)
             if busy:
-                self._renew(busy)
+                holding = [each for each in self._clients.values() if each._lease and each._lease == self._held]
+                self._renew([*busy, *(each for each in holding if each not in busy)])
                 await asyncio.sleep(LOOK_S)
         for end in (*self._clients, *self._arrived):
             end.close()
