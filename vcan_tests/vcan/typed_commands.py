@@ -57,6 +57,8 @@ TYPED = (
     ("sim lift on", 1, ""),
     ("sim hand front_left 10", 1, ""),
     ("sim look", 1, ""),
+    ("sim fault silence front_left", 1, ""),
+    ("sim faults", 1, ""),
     ("encoder status front", 0, ""),
     ("encoder zero front --yes", 0, "606#40046000"),
     ("nxt line 0.1", 1, ""),
