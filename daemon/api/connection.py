@@ -211,7 +211,7 @@ class Connection(asyncio.Protocol):
         if method is None:
             raise UsageError(f"no method {name[:80]!r}", remedy="api.schema lists the methods")
         self._peer.require(method)
-        if self.crowded and not method.urgent:
+        if self.crowded and not method.urgent and name != "hello":
             raise Refused("too many clients: this one may only stop", remedy="close other clients, and connect again")
         if len(self._pending) >= MAX_PENDING * (1 + method.urgent):
             raise Refused("too many requests under way", limit=MAX_PENDING, remedy="wait for answers")
