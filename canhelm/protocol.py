@@ -214,7 +214,7 @@ def _only_one(live: list[Path]) -> Path:
         raise _refused(SYSTEM_FOLDER)
     raise DaemonNotRunning(
         "no daemon is running",
-        remedy="start one: canhelm run --simulate --profile max2d, or systemctl start canhelm@NAME",
+        remedy="start one: canhelm run --profile NAME (--simulate without hardware), or systemctl start canhelm@NAME",
     )
 
 

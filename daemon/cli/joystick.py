@@ -19,7 +19,7 @@ from daemon.cli.output import say, show, wants_json, words
 from daemon.gamepad.driver import PERIOD_S, VALID_FOR_MS, PadDriver
 from daemon.gamepad.mapping import Mapping
 from daemon.gamepad.pad import opened
-from daemon.gamepad.pads import PadInfo, choose_pad, list_pads, require_parts
+from daemon.gamepad.pads import PadInfo, choose_pad, list_pads, no_pad_remedy, require_parts
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -33,9 +33,10 @@ LATE_S = PERIOD_S + VALID_FOR_MS / 1e3
 def show_pads(json: bool | None) -> int:
     """Print the pads of this machine; the exit code."""
     pads = [asdict(pad) for pad in list_pads()]
-    if not pads and not wants_json(json):
-        say("no gamepad is here; plug it in or switch it on")
-        return 0
+    if not pads:
+        say(f"no gamepad is here; {no_pad_remedy()}")
+        if not wants_json(json):
+            return 0
     show(pads, _table, json)
     return 0
 

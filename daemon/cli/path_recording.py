@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TextIO
 
-from canhelm.errors import Refused, UsageError
+from canhelm.errors import DaemonNotRunning, Refused, UsageError
 from daemon.cli.motion import signals_interrupt
 from daemon.cli.options import Options
 from daemon.cli.output import say, say_warning, show
@@ -46,6 +46,9 @@ def record(options: Options, name: str, duration_s: float | None, rate_hz: float
                         break
         except KeyboardInterrupt:
             pass
+        except DaemonNotRunning as error:
+            what = f"{error.message}; {name} is kept with {count} rows"
+            raise DaemonNotRunning(what, value=name, remedy=error.remedy) from None
     show({"record": name, "rows": count}, json=options.json)
     return 0
 

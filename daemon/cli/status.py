@@ -31,6 +31,8 @@ NARROW = 80
 """A terminal with fewer columns than this does without the devices' types."""
 HIDDEN = ("type", "methods", "name", "bit_rate")
 """Fields of a section that do not change and are left to JSON."""
+TOLD_AT_ZERO = ("section", "piece")
+"""Fields that are numbers of something, not counters."""
 BUS_GROUPS = {
     "line": ("baud", "line_utilisation", "own_idle_share", "exchanges"),
     "line plan": ("planned_", "speed_limit_", "silent_line_"),
@@ -190,7 +192,11 @@ def _bus_groups(bus: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
 
 def _telling(item: Mapping[str, Any]) -> dict[str, Any]:
     """A section without what never changes, what is empty, and counters that stand at zero."""
-    return {key: value for key, value in item.items() if key not in HIDDEN and (value or isinstance(value, float))}
+    return {
+        key: value
+        for key, value in item.items()
+        if key not in HIDDEN and (value or isinstance(value, float) or key in TOLD_AT_ZERO)
+    }
 
 
 def _event(event: Mapping[str, Any]) -> RenderableType:

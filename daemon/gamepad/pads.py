@@ -65,11 +65,19 @@ def choose_pad(wanted: str | None) -> PadInfo:
         pads = [pad for pad in pads if wanted == pad.name or path == os.path.realpath(pad.path)]
     if not pads:
         what = "no gamepad is here" if wanted is None else f"no gamepad {wanted!r} is here"
-        raise NodeAbsent(what, remedy="plug it in or switch it on; `canhelm drive joystick --list` shows what is there")
+        listed = "; `canhelm drive joystick --list` shows what is there"
+        raise NodeAbsent(what, remedy=no_pad_remedy() + listed)
     pad = next((pad for pad in pads if pad.readable), pads[0])
     if not pad.readable:
         raise PermissionRefused(f"this user may not read {pad.path} ({pad.name})", remedy=pad.remedy)
     return pad
+
+
+def no_pad_remedy() -> str:
+    """What to do where no pad is found."""
+    if DEVICES.is_dir():
+        return "plug it in or switch it on"
+    return f"there is no {DEVICES}: the kernel has no event devices, or this container does not have them"
 
 
 def require_parts(pad: PadInfo, axes: set[str], buttons: set[str]) -> None:

@@ -27,11 +27,20 @@ class PathBuilder:
         lead_m: as for :class:`daemon.loops.path.Path`.
         exchanged: drive backward what the file says is driven forward, and the other way round.
         forward_curvature, backward_curvature: as for :func:`daemon.loops.path.check_piece`.
+        from_here: the file says no start; where a joint is wrong, it is told what that means for points.
     """
 
     def __init__(
-        self, start: Pose, lead_m: float, exchanged: bool, forward_curvature: float, backward_curvature: float
+        self,
+        start: Pose,
+        lead_m: float,
+        exchanged: bool,
+        forward_curvature: float,
+        backward_curvature: float,
+        *,
+        from_here: bool = False,
     ) -> None:
+        self._from_here = from_here
         self._x_m, self._y_m, self._heading_rad = start.x_m, start.y_m, start.yaw_rad
         self._lead_m, self._exchanged = lead_m, exchanged
         self._curvatures = forward_curvature, backward_curvature
@@ -54,7 +63,8 @@ class PathBuilder:
                 else:
                     self._path.append(piece, self._entries)
         except CanhelmError as error:
-            raise _of_entry(error, self._entries) from None
+            stray = self._from_here and isinstance(error, UsageError) and error.limit is not None and _has_points(spec)
+            raise _of_entry(_in_frame(error) if stray else error, self._entries) from None
         self._entries += 1
         self._go_to_end()
 
@@ -130,6 +140,17 @@ def _of_entry(error: E, entry: int) -> E:
     return type(error)(message, object=f"pieces[{entry}]", value=error.value, limit=error.limit, remedy=error.remedy)
 
 
+def _has_points(spec: PieceSpec) -> bool:
+    return any(point is not None for point in (spec.from_m, spec.line_to_m, spec.centre_m, spec.waypoints_m))
+
+
+def _in_frame(error: E) -> E:
+    """The same error of a joint, for a file without a start."""
+    message = f"{error.message}; points count in the frame of `canhelm status`, and the file has no start:"
+    remedy = f"{error.remedy}, or add start: to the file"
+    return type(error)(message, object=error.object, value=error.value, limit=error.limit, remedy=remedy)
+
+
 def _half_told_arc(entry: int, spec: PieceSpec) -> UsageError:
     where = f"piece {entry}: arc_deg {spec.arc_deg:g}"
     if spec.radius_m is None:
@@ -163,7 +184,7 @@ async def build_path(
     """
     start = spec.start
     pose = here if start is None else Pose(start.x_m, start.y_m, math.radians(start.heading_deg))
-    builder = PathBuilder(pose, lead_m, exchanged, forward_curvature, backward_curvature)
+    builder = PathBuilder(pose, lead_m, exchanged, forward_curvature, backward_curvature, from_here=start is None)
     for number, piece in enumerate(spec.pieces, start=1):
         builder.add(piece)
         if number % PIECES_AT_A_TIME == 0:

@@ -54,6 +54,12 @@ def test_what_is_empty_or_zero_is_left_out_of_the_status_for_people() -> None:
     assert drawn({"robot": "r", "state": "idle", "bus": bus}).splitlines()[-1] == "bus: load 0"
 
 
+def test_the_first_section_and_piece_of_a_path_are_told() -> None:
+    motions = [{"kind": "drive.path", "section": 0, "piece": 0, "late": 0}]
+    told = drawn({"robot": "r", "state": "active", "motions": motions}).splitlines()[-1]
+    assert told == "motions: kind drive.path, section 0, piece 0"
+
+
 def test_a_serial_line_is_told_in_groups_with_a_line_each() -> None:
     bus = {"load": 0.3, "baud": 115200, "planned_hz": 16.1, "silent_line_stop_s": 1.87, "silent_nodes": [3]}
     told = drawn({"robot": "r", "state": "idle", "bus": bus}).splitlines()[-4:]

@@ -10,7 +10,9 @@ from typing import Any
 
 import pytest
 
+from canhelm.errors import DaemonNotRunning
 from daemon.cli.main import main
+from daemon.cli.options import Options
 from profiles.path_file import load_path_file
 from vcan_tests.daemon.test_processes import TIMEOUT_S, Bench
 
@@ -113,6 +115,34 @@ def test_what_is_no_record_is_refused(text: str, tmp_path: Path, capsys: pytest.
     assert main(["drive", "fit", str(record), str(tmp_path / "way.yaml")]) == 2
     assert str(record) in capsys.readouterr().err
     assert not (tmp_path / "way.yaml").exists()
+
+
+class HangsUp:
+    """A client of a daemon that is lost after two samples."""
+
+    def __enter__(self) -> HangsUp:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        return
+
+    def status(self) -> dict[str, Any]:
+        return {"vehicle": {"odometry": {"x_m": 0.0, "y_m": 0.0, "yaw_deg": 0.0}}}
+
+    def notifications(self, _: float) -> Iterator[tuple[str, dict[str, Any]]]:
+        for time_s in (1.0, 1.1):
+            yield "status", {"time_s": time_s, **self.status()}
+        raise DaemonNotRunning("the daemon hung up", remedy="look at its last words")
+
+
+def test_a_record_whose_daemon_is_lost_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(Options, "client", lambda _: HangsUp())
+    record = tmp_path / "way.csv"
+    assert main(["drive", "record", str(record)]) == 3
+    assert f"the daemon hung up; {record} is kept with 2 rows" in capsys.readouterr().err
+    assert len(record.read_text().splitlines()) == 3
 
 
 def test_a_tolerance_that_makes_no_sense_is_refused(tmp_path: Path) -> None:

@@ -42,6 +42,21 @@ async def test_a_path_with_a_start_begins_there() -> None:
     assert path.pieces[0].point(2.0) == pytest.approx((-3.0, 0.0))
 
 
+async def test_a_gap_before_a_point_is_told_with_its_frame_where_the_file_has_no_start() -> None:
+    error = await refused(PieceSpec(line_m=1.0), PieceSpec(from_m=(1.0, 0.0), line_m=1.0))
+    assert error.message.endswith("; points count in the frame of `canhelm status`, and the file has no start:")
+    assert (error.object, error.remedy) == (
+        "pieces[1]",
+        "let each piece begin where the last one ends, or add start: to the file",
+    )
+
+
+async def test_a_gap_in_a_file_with_a_start_is_told_without_it() -> None:
+    with pytest.raises(UsageError) as caught:
+        await built(PieceSpec(line_m=1.0), PieceSpec(from_m=(9.0, 0.0), line_m=1.0), start=StartSpec())
+    assert "frame" not in caught.value.message
+
+
 @given(st.lists(st.tuples(st.floats(0.5, 3.0), st.integers(-170, 170), st.booleans()), min_size=1, max_size=6))
 def test_pieces_that_say_nothing_of_their_begin_always_join(ways: list[tuple[float, int, bool]]) -> None:
     pieces = [

@@ -157,4 +157,14 @@ def test_without_a_pad_the_list_is_empty(
 ) -> None:
     monkeypatch.setattr(pads, "SYSFS", tmp_path)
     assert main(["drive", "joystick", "--list", "--json"]) == 0
-    assert capsys.readouterr().out == ""
+    out, err = capsys.readouterr()
+    assert (out, err.startswith("canhelm: no gamepad is here; ")) == ("", True)
+
+
+def test_a_machine_without_event_devices_is_told_to_be_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(pads, "SYSFS", tmp_path)
+    monkeypatch.setattr(pads, "DEVICES", tmp_path / "input")
+    assert main(["drive", "joystick", "--list", "--json"]) == 0
+    assert f"there is no {tmp_path / 'input'}: the kernel has no event devices" in capsys.readouterr().err
