@@ -4,6 +4,7 @@ Start a daemon first (`canhelm run --simulate --profile max2d`), then `python ex
 """
 
 import itertools
+import os
 import sys
 
 from canhelm.client import Client
@@ -20,11 +21,13 @@ def main() -> None:
         samples = (status for method, status in robot.notifications(rate_hz=10) if method == "status")
         for status in itertools.islice(samples, 10):
             speeds = [f"{node['speed_m_s']:.3f}" for node in status["nodes"] if "speed_m_s" in node]
-            print(f"{status['time_s']:.1f} s  wheels {' '.join(speeds)} m/s")
+            print(f"{status['time_s']:.1f} s  wheels {' '.join(speeds)} m/s", flush=True)
 
 
 if __name__ == "__main__":
     try:
         main()
+    except BrokenPipeError:  # whoever reads the output has seen enough, as `head` has
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except CanhelmError as error:
         sys.exit(str(error))

@@ -74,6 +74,18 @@ def test_reading_the_state_says_what_its_page_shows(max2d: Bench) -> None:
     assert alike(said, shown_output("python examples/read_state.py"))
 
 
+def test_reading_the_state_into_head_ends_quietly(max2d: Bench) -> None:
+    environment = {**max2d.environment(), "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "examples/read_state.py"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment) as program:
+        assert program.stdout is not None
+        assert program.stderr is not None
+        program.stdout.readline()
+        program.stdout.close()
+        assert program.stderr.read() == b""
+        assert program.wait(TIMEOUT_S) == 0
+
+
 def test_the_loop_of_ones_own_drives_its_way_at_100_hz(max2d: Bench) -> None:
     before = place(max2d)
     said = run(max2d, "examples/own_loop.py")
