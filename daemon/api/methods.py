@@ -323,7 +323,7 @@ _NODES = (
     ),
     Method(
         "lss.set_node_id",
-        "Store another node id in an LSS device, and let it count at once; refused while anything is enabled.",
+        "Store another node id in a drive or an LSS device; it counts at once; refused while anything is enabled.",
         (_DEVICE, Param("node_id", "integer", "the new node id", minimum=1, maximum=127), _CONFIRM),
         "device, node, note",
         Role.CONFIGURE,
