@@ -101,7 +101,7 @@ def bends(travel: complex, start: complex, end: complex) -> Iterator[Bend]:
     """
     change = end - start
     length = abs(change)
-    if not length:
+    if length < ROUNDING:
         return
     missed = travel - (start + end) / 2 * length
     across = (change.conjugate() * missed).imag / length

@@ -12,8 +12,10 @@ from daemon.loops.planner_paths import fastest_way, stop_and_go
 AT_ONCE: Final = 1e-9
 """Difference of two durations, relative to them, that counts as none."""
 TRIALS: Final = 45
-GENTLEST: Final = 1e-12
-"""Smallest part of the acceleration that is tried to make a way last longer."""
+GENTLEST: Final = 1e-5
+"""Smallest part of the acceleration that is tried to make a way last longer.
+
+The unit of length grows as the acceleration shrinks, and a way may miss its goal by a share of that unit."""
 
 
 class Way(NamedTuple):

@@ -216,6 +216,22 @@ def test_any_state_has_a_way_to_any_goal(
 
 
 @pytest.mark.parametrize(
+    ("start", "goal"),
+    [
+        ((0.0, 0.0, 0.0, 0.0, 0.5, 0.0), (1.0, 0.0, 0.0, 2.2e-313, 0.5, 0.0)),
+        ((0.0, 1e-10, 0.0, 0.0, 0.5, 0.0), (1e-11, 0.5, -1.0, -1e-13, 0.5, 0.0)),
+        ((-0.5, 0.0, 0.0, -1e-11, 0.5, 0.0), (-0.5, 0.0, 3.0, 0.0, 0.5, 0.0)),
+    ],
+    ids=["next to no change", "next to no change, and a turn that takes longer", "back at once, and a longer turn"],
+)
+def test_a_velocity_that_hardly_changes_leads_to_the_goal(start: tuple[float, ...], goal: tuple[float, ...]) -> None:
+    plan = plan_motion(PlanarState(*start), PlanarState(*goal), PlanarLimits(1.0, 0.5, 1.0, 1.0))
+    reached = plan.at(plan.ends)
+    assert miss_m(reached, plan.goal) < NEAR_M
+    assert miss_m_s(reached, plan.goal) < 1e-8
+
+
+@pytest.mark.parametrize(
     "arc",
     [
         Ramp(1.0, 0.2 + 0.3j, 0.6 - 0.8j),
