@@ -31,6 +31,7 @@ GUARDED = "network: {guard_time_ms: 250, life_time_factor: 4, boot_deadline_s: 2
 LIFE_TIME_S, MARGIN_S = 1.0, 0.3
 """Longer than a machine's pauses."""
 LISTENED_S = 2.0
+RESET_S = 30.0
 
 
 def link(interface: str, state: str) -> None:
@@ -39,6 +40,17 @@ def link(interface: str, state: str) -> None:
 
 def all_ready(status: Status) -> bool:
     return {node["node_state"] for node in status["nodes"]} == {"ready"}
+
+
+def reset_when_ready(daemon: Daemon) -> None:
+    """Reset as soon as all nodes are ready again, and once more where one restarts just then, as the answer says."""
+    deadline_s = time.monotonic() + RESET_S
+    while True:
+        daemon.wait_for(lambda status: "down" not in status["bus"] and all_ready(status))
+        done = daemon.canhelm("reset")
+        if done.returncode == 0:
+            return
+        assert time.monotonic() < deadline_s, done.stderr
 
 
 def drives(daemon: Daemon) -> bool:
@@ -73,8 +85,7 @@ def test_a_command_meanwhile_is_refused_with_that_reason(broken: Bench) -> None:
 
 def test_when_it_is_up_again_the_robot_boots_by_itself_and_drives_after_a_reset(broken: Bench) -> None:
     link("vcan0", "up")
-    broken.daemon.wait_for(lambda status: "down" not in status["bus"] and all_ready(status))
-    assert broken.daemon.canhelm("reset").returncode == 0
+    reset_when_ready(broken.daemon)
     assert drives(broken.daemon)
 
 
@@ -176,6 +187,5 @@ def test_drives_behind_a_failed_interface_stop_by_life_guarding_and_drive_again_
         assert (status["state"], status["bus"]["down"]) == ("fault", failure.cause)
         assert failure.remedy in status["bus"]["remedy"]
         failure.mend(drive.adapter, stack)
-        drive.daemon.wait_for(lambda status: "down" not in status["bus"] and all_ready(status))
-        assert drive.daemon.canhelm("reset").returncode == 0
+        reset_when_ready(drive.daemon)
         assert drives(drive.daemon)
