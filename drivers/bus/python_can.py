@@ -221,7 +221,7 @@ class PythonCanBus(Bus):
         """Begin to receive; an interface that is down says so at the first reading."""
         try:
             self._fd = link.fileno()
-        except NotImplementedError:  # python-can's word for an interface without a file descriptor
+        except NotImplementedError:  # from python-can: no descriptor, as slcan over rfc2217://
             self._reader = threading.Thread(target=self._read_until_closed, args=(link,), daemon=True, name=self.name)
             self._reader.start()
         else:

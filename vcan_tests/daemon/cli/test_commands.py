@@ -4,99 +4,17 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from canhelm import protocol
 from daemon.api.server import Server
 from daemon.cli.main import main
-from vcan_tests.daemon.fake_backend import FakeBackend, served
-
-
-@pytest.fixture
-def backend() -> FakeBackend:
-    return FakeBackend()
-
-
-@pytest.fixture
-def server(backend: FakeBackend, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Server]:
-    with served(backend, tmp_path / "robot.sock") as server:
-        monkeypatch.setenv("CANHELM_SOCKET", os.fspath(server.path))
-        yield server
-
-
-@pytest.fixture
-def nobody(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No daemon runs anywhere."""
-    monkeypatch.delenv("CANHELM_SOCKET", raising=False)
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    monkeypatch.setattr(protocol, "SYSTEM_FOLDER", tmp_path / "no-system")
-
-
-def run(line: str) -> int:
-    return main(line.split())
-
-
-def canhelm(line: str) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "daemon", *line.split()]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-
-
-# -- which daemon is asked ------------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def nearby(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[FakeBackend]:
-    """Another robot, ``other``, whose daemon listens in the folder of sockets."""
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    monkeypatch.setattr(protocol, "SYSTEM_FOLDER", tmp_path / "no-system")
-    (tmp_path / "canhelm").mkdir()
-    other = FakeBackend()
-    other.robot = "other"
-    with served(other, tmp_path / "canhelm" / "other.sock"):
-        yield other
-
-
-@pytest.mark.real_time
-def test_a_robot_that_is_named_goes_before_a_socket_in_the_environment(
-    server: Server, backend: FakeBackend, nearby: FakeBackend
-) -> None:
-    assert run("estop --robot other") == 0
-    assert ([call[0] for call in nearby.calls], backend.calls) == (["estop"], [])
-
-
-@pytest.mark.real_time
-def test_a_robot_that_does_not_run_is_no_reason_to_ask_another(
-    server: Server, backend: FakeBackend, nearby: FakeBackend, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run("steer front 5 --robot third") == 3
-    assert ("third.sock" in capsys.readouterr().err, backend.calls, nearby.calls) == (True, [], [])
-
-
-@pytest.mark.real_time
-def test_a_socket_that_is_named_goes_before_a_robot_in_the_environment(
-    server: Server, backend: FakeBackend, nearby: FakeBackend, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("CANHELM_ROBOT", "other")
-    assert run(f"stop --socket {server.path}") == 0
-    assert ([call[0] for call in backend.calls], nearby.calls) == (["stop"], [])
-
-
-@pytest.mark.real_time
-def test_a_robot_that_is_not_the_one_behind_the_named_socket_is_refused(
-    server: Server, backend: FakeBackend, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run(f"motor velocity 1 100 --socket {server.path} --robot other") == 2
-    assert "is robot fake, not other" in capsys.readouterr().err
-    assert run(f"stop --socket {server.path} --robot fake") == 0
-    assert [call[0] for call in backend.calls] == ["stop"]
-
+from vcan_tests.daemon.cli.shell import canhelm, run
+from vcan_tests.daemon.fake_backend import FakeBackend
 
 # -- what is sent -----------------------------------------------------------------------------------------------------
 
@@ -319,106 +237,3 @@ def test_closed_outputs_fail_nothing(server: Server, backend: FakeBackend, close
     done = subprocess.run(f"{sys.executable} -m daemon stop {closed}", shell=True, capture_output=True)
     assert (done.returncode, done.stderr) == (0, b"")
     assert backend.calls[-1][0] == "stop"
-
-
-# -- interruption -----------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_motion_is_stopped_and_said_so(
-    server: Server, backend: FakeBackend, number: signal.Signals
-) -> None:
-    with canhelm("motor velocity 1 -250") as process:
-        assert backend.called.wait(10)
-        process.send_signal(number)
-        out, err = process.communicate(timeout=10)
-    assert (process.returncode, out) == (130, "")
-    assert "the motion was stopped" in err
-    assert backend.stopped == ["lease-1"]
-
-
-def test_an_interrupted_monitor_leaves_the_robot_alone(server: Server, backend: FakeBackend) -> None:
-    with canhelm("monitor --rate 50") as process:
-        assert process.stdout is not None
-        process.stdout.readline()
-        process.send_signal(signal.SIGINT)
-        assert process.wait(10) == 130
-    assert not backend.calls
-
-
-@pytest.mark.parametrize("line", ["status --follow --rate 50", "monitor --rate 50"])
-def test_sigterm_ends_a_command_in_order(server: Server, line: str) -> None:
-    with canhelm(line) as process:
-        assert process.stdout is not None
-        assert process.stderr is not None
-        process.stdout.readline()
-        process.terminate()
-        assert (process.wait(10), process.stderr.read()) == (130, "canhelm: interrupted\n")
-
-
-def test_an_interruption_while_the_command_is_loaded_is_no_traceback(capsys: pytest.CaptureFixture[str]) -> None:
-    code = (
-        "import builtins, signal, sys\n"
-        "from daemon.__main__ import main\n"
-        "load = builtins.__import__\n"
-        "def interrupt(name, *rest):\n"
-        "    if name.startswith('cyclopts'): signal.raise_signal(signal.SIGINT)\n"
-        "    return load(name, *rest)\n"
-        "builtins.__import__ = interrupt\n"
-        "sys.exit(main())\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code, "status"], capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (130, "")
-
-
-# -- help -------------------------------------------------------------------------------------------------------------
-
-NOUNS = ("motor", "brake", "drive", "nmt", "sdo", "sim")
-WITH_EXAMPLES = {" ".join(line.split()[: 1 + (line.split()[0] in NOUNS)]) for line, _, _ in SENT}
-WITH_EXAMPLES |= {"status", "monitor", "doctor", "version", "completion", "explain", "run", "make-safe", "demo"}
-
-
-@pytest.mark.parametrize("command", sorted(WITH_EXAMPLES))
-def test_every_command_helps_with_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(f"{command} --help") == 0
-    assert f"Example: canhelm {command}" in capsys.readouterr().out
-
-
-def test_day_to_day_verbs_come_first_in_the_help(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("-h") == 0
-    text = capsys.readouterr().out
-    assert "Stop everything now" in text
-    assert text.index("stop") < text.index("status") < text.index("steer") < text.index("nmt") < text.index("demo")
-
-
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_completion_knows_the_verbs(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(f"completion {shell}") == 0
-    assert "quick-stop" in capsys.readouterr().out
-
-
-def test_an_installed_completion_says_which_startup_file_it_changed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("HOME", str(tmp_path))
-    assert run("completion bash --install") == 0
-    assert "~/.bashrc loads it" in capsys.readouterr().err
-    assert "canhelm" in (tmp_path / ".bashrc").read_text()
-
-
-def test_a_completion_that_cannot_be_installed_tells_the_way_by_hand(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("HOME", "/proc/nowhere")
-    assert run("completion bash --install") == 7
-    assert "canhelm completion bash > FILE" in capsys.readouterr().err
-
-
-def test_the_help_of_steer_promises_only_what_steers(capsys: pytest.CaptureFixture[str]) -> None:
-    run("steer --help")
-    assert "rear or all" not in capsys.readouterr().out
-
-
-def test_version_names_the_api(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("version") == 0
-    assert json.loads(capsys.readouterr().out)["api_version"] == protocol.API_VERSION
