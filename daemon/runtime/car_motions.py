@@ -22,13 +22,14 @@ class Senses(Protocol):
 
 
 class CarMotion(Motion):
-    """One target, for a time or a way, then rest.
+    """One target for a time or a way, or those of a stream (``drive.set``), then rest.
 
     Args:
         senses: the pose.
         law: of its own.
         target: what to do.
         duration_s: time after which the car comes to rest; None: when the target's way is covered, or until stopped.
+        stream: of targets; the car rests while the newest is too old.
 
     Attributes:
         record: of the last step; None before the first.
@@ -44,8 +45,9 @@ class CarMotion(Motion):
         law: CarLaw,
         target: CarTarget,
         duration_s: float | None = None,
+        stream: Streamed[CarTarget] | None = None,
     ) -> None:
-        super().__init__(kind, drives, lease)
+        super().__init__(kind, drives, lease, stream)
         self.record: CarRecord | None = None
         self.target: CarTarget | None = target
         self._senses = senses
@@ -56,6 +58,7 @@ class CarMotion(Motion):
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """One step of the law; without a target it brings the car to rest."""
         self._remaining_s -= dt_s
+        self.target = self.newest(self.target, measurement.time_s)
         if self.stop_reason or self._remaining_s <= 0.0:
             self.target = None
         command, record = self._law.step(measurement, self._senses.odometry.pose.yaw_rad, self.target, dt_s)
@@ -66,12 +69,9 @@ class CarMotion(Motion):
         if record.failure:
             remedy = "`canhelm status` shows drives and encoders"
             self.fail(DeviceFault(f"{self.kind}: {record.failure}", remedy=remedy))
-        elif record.done and at_rest and self._may_end():
+        elif record.done and at_rest and not self.goes_on_at_rest:
             self.finish(self._result(measurement.time_s))
         return command
-
-    def _may_end(self) -> bool:
-        return True
 
     def _result(self, now_s: float) -> dict[str, Any]:
         return {
@@ -95,36 +95,3 @@ class CarMotion(Motion):
             "remaining_m": None if record.remaining_m is None else round(record.remaining_m, 4),
             "limits_active": list(record.limits_active),
         }
-
-
-class CarStream(CarMotion):
-    """Driving by a stream of targets (``drive.set``); the car stops when the last one is too old.
-
-    Args:
-        valid_for_s: age at which the first value is too old.
-    """
-
-    def __init__(
-        self,
-        kind: str,
-        drives: tuple[str, ...],
-        lease: str | None,
-        senses: Senses,
-        law: CarLaw,
-        target: CarTarget,
-        valid_for_s: float,
-    ) -> None:
-        super().__init__(kind, drives, lease, senses, law, target)
-        self.stream: Streamed[CarTarget] = Streamed(target, valid_for_s)
-
-    def step(self, measurement: Measurement, dt_s: float) -> Command:
-        """Follow the newest value, or come to rest where it is too old."""
-        self.target = self.newest(self.stream, measurement.time_s)
-        return super().step(measurement, dt_s)
-
-    def _may_end(self) -> bool:
-        return bool(self.stop_reason)
-
-    def progress(self) -> dict[str, Any]:
-        """As of any motion, and the age of the last value."""
-        return {**super().progress(), "value_age_ms": self.stream.age_ms}

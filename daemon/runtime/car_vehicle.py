@@ -16,14 +16,14 @@ from daemon.loops.path_driving import VehicleReading
 from daemon.loops.path_following import FollowingTuning
 from daemon.loops.path_speed import SpeedTuning
 from daemon.loops.truck_odometry import TruckOdometry
-from daemon.runtime.car_motions import CarMotion, CarStream
+from daemon.runtime.car_motions import CarMotion
 from daemon.runtime.motions import Motion
 from daemon.runtime.path_building import build_path
 from daemon.runtime.path_commands import PathRequest
 from daemon.runtime.path_motions import FollowedPath, PathMotion
 from daemon.runtime.poses import place_and_yaw
 from daemon.runtime.steered_vehicle import SteeredVehicle
-from daemon.runtime.streams import valid_for_s
+from daemon.runtime.streams import streamed
 from daemon.runtime.vehicle import Stick, both_ways, require_at_most
 from drivers.contract import Drive, SteeringEncoder
 from profiles.schema import Profile
@@ -71,7 +71,8 @@ class CarVehicle(SteeredVehicle):
         """The motion of ``drive.heading``, ``drive.turn`` or ``drive.set``."""
         law = self._law()
         if method == "drive.set":
-            return CarStream(method, self.names, lease, self, law, self.set_point(params), valid_for_s(params))
+            target = self.set_point(params)
+            return CarMotion(method, self.names, lease, self, law, target, stream=streamed(target, params))
         if method == "drive.turn":
             return CarMotion(method, self.names, lease, self, law, self._arc(params))
         target = CarTarget(self._speed(params), heading_rad=math.radians(params["heading_deg"]))

@@ -27,8 +27,7 @@ class DifferentialStream(Motion):
 
     Args:
         law: of its own.
-        wanted: the first value.
-        valid_for_s: age at which it is too old.
+        stream: of set points.
     """
 
     def __init__(
@@ -37,16 +36,14 @@ class DifferentialStream(Motion):
         drives: tuple[str, ...],
         lease: str | None,
         law: DifferentialTwistLaw,
-        wanted: SetPoint,
-        valid_for_s: float,
+        stream: Streamed[SetPoint],
     ) -> None:
-        super().__init__(kind, drives, lease)
-        self.stream: Streamed[SetPoint] = Streamed(wanted, valid_for_s)
+        super().__init__(kind, drives, lease, stream)
         self._law = law
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """Follow the newest value, or come to rest where it is too old or the motion was stopped."""
-        wanted = self.newest(self.stream, measurement.time_s) or STANDING
+        wanted: SetPoint = self.newest(None, measurement.time_s) or STANDING
         command = self._law.step(*(STANDING if self.stop_reason else wanted), dt_s)
         rests = all(abs(speed) < AT_REST_M_S for speed in measurement.wheel_speed_m_s)
         if self.stop_reason and rests and not any(command.wheel_speed_m_s):
@@ -54,10 +51,9 @@ class DifferentialStream(Motion):
         return command
 
     def progress(self) -> dict[str, Any]:
-        """What is commanded, and the age of the last value."""
+        """What is commanded."""
         return {
             "phase": "stopping" if self.stop_reason else "driving",
             "speed_m_s": round(self._law.forward_m_s, 4),
             "yaw_rate_deg_s": round(math.degrees(self._law.yaw_rate_rad_s), 2),
-            "value_age_ms": self.stream.age_ms,
         }

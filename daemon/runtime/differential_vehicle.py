@@ -18,7 +18,7 @@ from daemon.runtime.differential_motions import BrickMoves, BrickWheels, PoseMot
 from daemon.runtime.differential_stream import DifferentialStream, SetPoint
 from daemon.runtime.motions import Motion
 from daemon.runtime.poses import place_and_yaw
-from daemon.runtime.streams import valid_for_s
+from daemon.runtime.streams import streamed
 from daemon.runtime.vehicle import Stick, Vehicle, both_ways, require_at_most
 from drivers.contract import Drive
 from drivers.nxt.motors import NxtDrive
@@ -74,7 +74,7 @@ class DifferentialVehicle(Vehicle):
             return self._to(params, lease)
         if method == "drive.set":
             law, wanted = DifferentialTwistLaw(self._drive, self.profile.limits), self.set_point(params)
-            return DifferentialStream(method, self._names, lease, law, wanted, valid_for_s(params))
+            return DifferentialStream(method, self._names, lease, law, streamed(wanted, params))
         if method == "nxt.goto" and params.get("feedback", True):
             goal = _pose(params, 0.0)
             here = self.odometry.pose

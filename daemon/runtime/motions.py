@@ -28,6 +28,7 @@ class Motion(ABC):
         kind: the method that asked for it (``drive.turn``).
         drives: names of the drives it moves.
         lease: who holds it; None for a finite motion that was handed to the daemon.
+        stream: of a motion whose caller does not wait for it but goes on with new values, these.
 
     Attributes:
         identity: number by which clients name it.
@@ -35,17 +36,18 @@ class Motion(ABC):
         closed: set when its drives are at rest and as it found them.
         asked: parameters that it was asked for with.
         record: terms of its law's last step; None before the first, and where it has no law.
-        stream: of a motion whose caller does not wait for it but goes on with new values, these.
     """
 
     record: object | None = None
-    stream: Streamed[Any] | None = None
 
-    def __init__(self, kind: str, drives: tuple[str, ...], lease: str | None) -> None:
+    def __init__(
+        self, kind: str, drives: tuple[str, ...], lease: str | None, stream: Streamed[Any] | None = None
+    ) -> None:
         self.identity = ""
         self.kind = kind
         self.drives = drives
         self.lease = lease
+        self.stream = stream
         self.running = False
         self.stop_reason = ""
         self.begun_s = 0.0
@@ -70,12 +72,22 @@ class Motion(ABC):
         """Bring the motion to rest by its ramp and end it."""
         self.stop_reason = self.stop_reason or reason
 
-    def newest(self, stream: Streamed[T], now_s: float) -> T | None:
-        """The value of a stream, None where it is too old; a stream that is over stops the motion."""
-        value = stream.at(now_s)
-        if not self.stop_reason and stream.over:
+    def newest(self, target: T | None, now_s: float) -> T | None:
+        """What to do now: the stream's value, None where that is too old; without a stream the target as it is.
+
+        A stream that is over stops the motion.
+        """
+        if self.stream is None:
+            return target
+        value: T | None = self.stream.at(now_s)
+        if not self.stop_reason and self.stream.over:
             self.stop("no new value came")
         return value
+
+    @property
+    def goes_on_at_rest(self) -> bool:
+        """Whether rest is not its end: until it is stopped, a stream may bring a new value."""
+        return self.stream is not None and not self.stop_reason
 
     def progress(self) -> dict[str, Any]:
         """How far it is, for ``status``."""
@@ -83,12 +95,17 @@ class Motion(ABC):
 
     def summary(self) -> dict[str, Any]:
         """The motion for ``status``."""
-        return {"motion": self.identity, "kind": self.kind, "drives": list(self.drives), **self.progress()}
+        return {"motion": self.identity, "kind": self.kind, "drives": list(self.drives), **self._told()}
 
     @property
     def terms(self) -> object:
         """What is recorded of its newest step: the terms of its law, or its progress where it has no law."""
-        return self.progress() if self.record is None else self.record
+        return self._told() if self.record is None else self.record
+
+    def _told(self) -> dict[str, Any]:
+        """Its progress, and the age of a stream's newest value."""
+        age = {} if self.stream is None else {"value_age_ms": self.stream.age_ms}
+        return {**self.progress(), **age}
 
     async def result(self) -> dict[str, Any]:
         """Wait until it is closed; its result. Raises the error that ended it."""
@@ -100,7 +117,7 @@ class Motion(ABC):
         if self.ended.done():
             return
         if self.stop_reason:
-            self.fail(Refused(f"the motion was stopped: {self.stop_reason}", value=self.progress() or None))
+            self.fail(Refused(f"the motion was stopped: {self.stop_reason}", value=self._told() or None))
         else:
             self.ended.set_result(result)
 

@@ -32,8 +32,16 @@ class OmniMotion(Motion):
         slip_steps: steps in which slip was detected.
     """
 
-    def __init__(self, kind: str, drives: tuple[str, ...], lease: str | None, senses: OmniSenses, law: OmniLaw) -> None:
-        super().__init__(kind, drives, lease)
+    def __init__(
+        self,
+        kind: str,
+        drives: tuple[str, ...],
+        lease: str | None,
+        senses: OmniSenses,
+        law: OmniLaw,
+        stream: Streamed[Twist] | None = None,
+    ) -> None:
+        super().__init__(kind, drives, lease, stream)
         self.record: OmniRecord | None = None
         self.least_factor = 1.0
         self.slip_steps = 0
@@ -127,11 +135,12 @@ class GoalMotion(OmniMotion):
 
 
 class TwistMotion(OmniMotion):
-    """A twist for a time, or until stopped.
+    """A twist for a time, until stopped, or as a stream has it (``drive.set``).
 
     Args:
         guide: the law's.
         duration_s: time after which it ends; None: until stopped.
+        stream: of twists; the robot rests while the newest is too old.
     """
 
     def __init__(
@@ -142,57 +151,21 @@ class TwistMotion(OmniMotion):
         senses: OmniSenses,
         law: OmniLaw,
         guide: TwistGuide,
-        duration_s: float | None,
+        duration_s: float | None = None,
+        stream: Streamed[Twist] | None = None,
     ) -> None:
-        super().__init__(kind, drives, lease, senses, law)
+        super().__init__(kind, drives, lease, senses, law, stream)
         self._guide = guide
         self._remaining_s = math.inf if duration_s is None else duration_s
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
-        """The twist until the time is over, then rest."""
+        """The twist until the time is over or the newest is too old, then rest."""
         self._remaining_s -= dt_s
-        if self._remaining_s <= 0.0:
-            self._guide.twist = STANDING
+        twist = self.newest(self._guide.twist, measurement.time_s)
+        self._guide.twist = STANDING if twist is None or self._remaining_s <= 0.0 else twist
         return super().step(measurement, dt_s)
 
     def on_done(self, measurement: Measurement, record: OmniRecord) -> None:
         """At rest: over, unless it stands because that was asked for."""
         if record.stopping or self._remaining_s <= 0.0:
             super().on_done(measurement, record)
-
-
-class TwistStream(OmniMotion):
-    """Driving by a stream of twists (``drive.set``); the robot comes to rest when the last one is too old.
-
-    Args:
-        guide: the law's.
-        valid_for_s: age at which the first value is too old.
-    """
-
-    def __init__(
-        self,
-        kind: str,
-        drives: tuple[str, ...],
-        lease: str | None,
-        senses: OmniSenses,
-        law: OmniLaw,
-        guide: TwistGuide,
-        valid_for_s: float,
-    ) -> None:
-        super().__init__(kind, drives, lease, senses, law)
-        self._guide = guide
-        self.stream: Streamed[Twist] = Streamed(guide.twist, valid_for_s)
-
-    def step(self, measurement: Measurement, dt_s: float) -> Command:
-        """Follow the newest value, or come to rest where it is too old."""
-        self._guide.twist = self.newest(self.stream, measurement.time_s) or STANDING
-        return super().step(measurement, dt_s)
-
-    def on_done(self, measurement: Measurement, record: OmniRecord) -> None:
-        """At rest: over only when it was stopped."""
-        if record.stopping:
-            super().on_done(measurement, record)
-
-    def progress(self) -> dict[str, Any]:
-        """As of any motion, and the age of the last value."""
-        return {**super().progress(), "value_age_ms": self.stream.age_ms}

@@ -17,10 +17,10 @@ from daemon.loops.planner import FARTHEST, PlanarLimits, PlanarState
 from daemon.loops.slip import THRESHOLD_M_S2
 from daemon.loops.traction import Traction, TractionTuning
 from daemon.runtime.motions import Motion
-from daemon.runtime.omni_motions import GoalMotion, OmniMotion, TwistMotion, TwistStream
+from daemon.runtime.omni_motions import GoalMotion, OmniMotion, TwistMotion
 from daemon.runtime.poses import place_and_yaw
 from daemon.runtime.rest import AT_REST_M_S
-from daemon.runtime.streams import valid_for_s
+from daemon.runtime.streams import streamed
 from daemon.runtime.vehicle import Stick, Vehicle, both_ways, require_at_most
 from drivers.contract import Accelerometer as Sensor
 from drivers.contract import Drive, DriveState
@@ -88,7 +88,8 @@ class OmniVehicle(Vehicle):
             return self._parallel(params, lease)
         if method == "drive.set":
             law, guide = self._on_twist(self.set_point(params))
-            return TwistStream(method, self._names, lease, self.senses, law, guide, valid_for_s(params))
+            stream = streamed(guide.twist, params)
+            return TwistMotion(method, self._names, lease, self.senses, law, guide, stream=stream)
         law, guide = self._on_twist(self._twist(0.0, 0.0, params["rate_deg_s"]))
         return TwistMotion(method, self._names, lease, self.senses, law, guide, params.get("duration_s"))
 

@@ -36,13 +36,14 @@ class Senses(Protocol):
 
 
 class OwnMotion(Motion):
-    """A twist for a time, or until stopped, then rest.
+    """A twist for a time, until stopped, or as a stream has it (``drive.set``), then rest.
 
     Args:
         law: of its own.
         senses: where the robot is.
         twist: what to do.
         duration_s: time after which it ends; None: until stopped.
+        stream: of twists; the robot rests while the newest is too old.
     """
 
     def __init__(
@@ -54,8 +55,9 @@ class OwnMotion(Motion):
         senses: Senses,
         twist: Twist,
         duration_s: float | None = None,
+        stream: Streamed[Twist] | None = None,
     ) -> None:
-        super().__init__(kind, drives, lease)
+        super().__init__(kind, drives, lease, stream)
         self.target: Twist | None = twist
         self._law = law
         self._senses = senses
@@ -63,6 +65,7 @@ class OwnMotion(Motion):
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """One step of the law; without a target it brings the robot to rest."""
+        self.target = self.newest(self.target, measurement.time_s)
         if self.stop_reason or self._remaining_s < dt_s / 2:
             self.target = None
         self._remaining_s -= dt_s
@@ -72,8 +75,10 @@ class OwnMotion(Motion):
             command = self._commanded(measurement, dt_s)
         except Exception as error:
             raise DeviceFault(failure_of(self._law, "step", error), remedy=MEND) from error
-        if self.target is None and all(abs(speed) < AT_REST_M_S for speed in measurement.wheel_speed_m_s):
-            self.on_rest(measurement)
+        at_rest = all(abs(speed) < AT_REST_M_S for speed in measurement.wheel_speed_m_s)
+        if self.target is None and at_rest and not self.goes_on_at_rest:
+            duration_s = round(measurement.time_s - self.begun_s, 3)
+            self.finish({**place_and_heading(self._senses.pose), "duration_s": duration_s})
         return command
 
     def _commanded(self, measurement: Measurement, dt_s: float) -> Command:
@@ -83,11 +88,6 @@ class OwnMotion(Motion):
         if len(command.release_brake) not in (0, self._law.brakes):
             raise ValueError(f"{len(command.release_brake)} brakes are commanded, there are {self._law.brakes}")
         return command
-
-    def on_rest(self, measurement: Measurement) -> None:
-        """At rest without a target."""
-        duration_s = round(measurement.time_s - self.begun_s, 3)
-        self.finish({**place_and_heading(self._senses.pose), "duration_s": duration_s})
 
     def progress(self) -> dict[str, Any]:
         """The target, and the time left."""
@@ -99,38 +99,3 @@ class OwnMotion(Motion):
             "yaw_rate_deg_s": round(math.degrees(rate), 3),
             "remaining_s": max(0.0, round(self._remaining_s, 3)) if math.isfinite(self._remaining_s) else None,
         }
-
-
-class OwnStream(OwnMotion):
-    """Driving by a stream of twists (``drive.set``); the robot comes to rest when the last one is too old.
-
-    Args:
-        valid_for_s: age at which the first value is too old.
-    """
-
-    def __init__(
-        self,
-        kind: str,
-        drives: tuple[str, ...],
-        lease: str | None,
-        law: OwnVehicle,
-        senses: Senses,
-        twist: Twist,
-        valid_for_s: float,
-    ) -> None:
-        super().__init__(kind, drives, lease, law, senses, twist)
-        self.stream: Streamed[Twist] = Streamed(twist, valid_for_s)
-
-    def step(self, measurement: Measurement, dt_s: float) -> Command:
-        """Follow the newest value, or come to rest where it is too old."""
-        self.target = self.newest(self.stream, measurement.time_s)
-        return super().step(measurement, dt_s)
-
-    def on_rest(self, measurement: Measurement) -> None:
-        """At rest: over only when it was stopped."""
-        if self.stop_reason:
-            super().on_rest(measurement)
-
-    def progress(self) -> dict[str, Any]:
-        """As of any motion, and the age of the last value."""
-        return {**super().progress(), "value_age_ms": self.stream.age_ms}

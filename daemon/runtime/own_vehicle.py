@@ -12,9 +12,9 @@ from daemon.loops.measurement import Measurement
 from daemon.loops.odometry import MAX_STEP_M, Pose, moved_along_arc
 from daemon.loops.own_vehicle import OwnVehicle, Twist
 from daemon.runtime.motions import Motion
-from daemon.runtime.own_motions import OwnMotion, OwnStream
+from daemon.runtime.own_motions import OwnMotion
 from daemon.runtime.poses import place_and_yaw
-from daemon.runtime.streams import valid_for_s
+from daemon.runtime.streams import streamed
 from daemon.runtime.vehicle import Stick, Vehicle, both_ways, require_at_most
 from drivers.contract import Brake, Drive, SteeringEncoder
 from profiles.own_class import load_class
@@ -76,7 +76,8 @@ class OwnKindVehicle(Vehicle):
             raise DeviceFault(self.failure, remedy="mend the class, then start the daemon anew")
         law = self._new_law()
         if method == "drive.set":
-            return OwnStream(method, self._names, lease, law, self, self.set_point(params), valid_for_s(params))
+            twist = self.set_point(params)
+            return OwnMotion(method, self._names, lease, law, self, twist, stream=streamed(twist, params))
         angle_deg, speed_m_s = params.get("angle_deg", 0.0), params.get("speed_m_s", 0.0)
         twist = self._twist(speed_m_s, angle_deg, params.get("rate_deg_s", 0.0))
         return OwnMotion(method, self._names, lease, law, self, twist, params.get("duration_s"))

@@ -14,11 +14,12 @@ from daemon.runtime.streams import Streamed
 
 
 class PairedSteerMotion(Motion):
-    """One target of the law, from steering to rest.
+    """One target of the law from steering to rest, or those of a stream (``drive.set``).
 
     Args:
         law: a law of its own, at rest.
         target: what to do; None: come to rest.
+        stream: of targets; the robot rests while the newest is too old.
 
     Attributes:
         record: of the last step; None before the first.
@@ -31,8 +32,9 @@ class PairedSteerMotion(Motion):
         lease: str | None,
         law: PairedSteerLaw,
         target: PairedSteerTarget | None,
+        stream: Streamed[PairedSteerTarget] | None = None,
     ) -> None:
-        super().__init__(kind, drives, lease)
+        super().__init__(kind, drives, lease, stream)
         self._law = law
         self._target = target
         self.record: PairedSteerRecord | None = None
@@ -40,15 +42,14 @@ class PairedSteerMotion(Motion):
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """One step of the law; without a target it brings the robot to rest and engages the brakes."""
-        if self.stop_reason:
-            self._target = None
+        self._target = None if self.stop_reason else self.newest(self._target, measurement.time_s)
         command, record = self._law.step(measurement, self._target, dt_s)
         self.record = record
         if self._target is not None:
             self._driven = record
         if record.failure:
             self.fail(DeviceFault(f"{self.kind}: {record.failure}", remedy="`canhelm status` shows drives and brakes"))
-        elif record.done:
+        elif record.done and not self.goes_on_at_rest:
             self.on_done(measurement.time_s)
         return command
 
@@ -81,30 +82,3 @@ class PairedSteerMotion(Motion):
             "limits_active": list(record.limits_active),
             "warnings": list(record.warnings),
         }
-
-
-class StreamMotion(PairedSteerMotion):
-    """Driving by a stream of values (``drive.set``); the robot stops when the last one is too old.
-
-    Args:
-        valid_for_s: age at which the first value is too old.
-    """
-
-    def __init__(
-        self, kind: str, drives: tuple[str, ...], lease: str | None, law: PairedSteerLaw, target: PairedSteerTarget,
-        valid_for_s: float,
-    ) -> None:  # fmt: skip
-        super().__init__(kind, drives, lease, law, target)
-        self.stream: Streamed[PairedSteerTarget] = Streamed(target, valid_for_s)
-
-    def step(self, measurement: Measurement, dt_s: float) -> Command:
-        """Follow the newest value, or come to rest where it is too old."""
-        self._target = self.newest(self.stream, measurement.time_s)
-        if self.stop_reason or self._target is not None:
-            return super().step(measurement, dt_s)
-        command, self.record = self._law.step(measurement, None, dt_s)
-        return command
-
-    def progress(self) -> dict[str, Any]:
-        """As of any motion, and the age of the last value."""
-        return {**super().progress(), "value_age_ms": self.stream.age_ms}

@@ -26,12 +26,12 @@ from daemon.loops.paired_steer_target import (
 from daemon.loops.paired_traction import rim_drives
 from daemon.loops.path_in_pieces import PiecePlanner
 from daemon.runtime.motions import Motion
-from daemon.runtime.paired_steer_motions import PairedSteerMotion, StreamMotion
+from daemon.runtime.paired_steer_motions import PairedSteerMotion
 from daemon.runtime.path_building import build_path
 from daemon.runtime.path_commands import PathRequest
 from daemon.runtime.path_in_pieces import PiecesPlan
 from daemon.runtime.poses import place_and_yaw
-from daemon.runtime.streams import valid_for_s
+from daemon.runtime.streams import streamed
 from daemon.runtime.vehicle import Stick, Vehicle, both_ways
 from drivers.contract import Brake, Drive, SteeringEncoder
 from profiles.schema import PairedSteerGeometry, Profile
@@ -66,7 +66,8 @@ class PairedSteerVehicle(Vehicle):
             raise Refused(why_not_rotate(), remedy="`canhelm drive turn` or `canhelm drive parallel`")
         if method == "drive.set":
             set_point = self.set_point(params)
-            return StreamMotion(method, self.names, lease, self.new_law(), set_point, valid_for_s(params))
+            stream = streamed(set_point, params)
+            return PairedSteerMotion(method, self.names, lease, self.new_law(), set_point, stream)
         target = self._target(method, params)
         check_target(self.geometry, self.limits, target)
         return PairedSteerMotion(method, self.names, lease, self.new_law(), target)

@@ -22,7 +22,7 @@ from daemon.runtime.path_commands import PathRequest
 from daemon.runtime.path_motions import FollowedPath, PathMotion
 from daemon.runtime.poses import place_and_yaw
 from daemon.runtime.steered_vehicle import SteeredVehicle
-from daemon.runtime.streams import valid_for_s
+from daemon.runtime.streams import streamed
 from daemon.runtime.truck_stream import TruckStream
 from daemon.runtime.vehicle import Stick, both_ways, require_at_most
 from drivers.contract import Drive, SteeringEncoder
@@ -108,7 +108,7 @@ class SemitrailerVehicle(SteeredVehicle):
     def motion(self, method: str, params: dict[str, Any], lease: str | None) -> Motion:
         """The motion of ``drive.set``; ``drive.path`` plans first, and never comes here."""
         law = TruckLaw(self.kinematics, self.axle, self.profile.limits)
-        return TruckStream(method, lease, self, law, self.set_point(params), valid_for_s(params))
+        return TruckStream(method, lease, self, law, streamed(self.set_point(params), params))
 
     def set_point(self, params: dict[str, Any]) -> TruckTarget:
         """The target that ``drive.set`` asks for. Raises LimitExceeded or Refused."""

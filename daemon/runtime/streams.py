@@ -48,6 +48,11 @@ class Streamed(Generic[T]):
         return round(self.age_s * 1e3)
 
 
+def streamed(value: T, params: dict[str, Any]) -> Streamed[T]:
+    """The stream that a ``drive.set`` with these parameters begins."""
+    return Streamed(value, valid_for_s(params))
+
+
 def valid_for_s(params: dict[str, Any]) -> float:
     """How long the value of a ``drive.set`` is good."""
     return float(params["valid_for_ms"]) / 1e3

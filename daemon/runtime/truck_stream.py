@@ -20,8 +20,7 @@ class TruckStream(Motion):
     Args:
         vehicle: that drives.
         law: of its own.
-        target: the first value.
-        valid_for_s: age at which it is too old.
+        stream: of targets.
 
     Attributes:
         record: of the last step; None before the first.
@@ -33,17 +32,16 @@ class TruckStream(Motion):
         lease: str | None,
         vehicle: FollowingVehicle,
         law: TruckLaw,
-        target: TruckTarget,
-        valid_for_s: float,
+        stream: Streamed[TruckTarget],
     ) -> None:
-        super().__init__(kind, vehicle.names, lease)
-        self.stream: Streamed[TruckTarget] = Streamed(target, valid_for_s)
+        super().__init__(kind, vehicle.names, lease, stream)
         self.record: TruckRecord | None = None
         self._vehicle, self._law = vehicle, law
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """Follow the newest value, or come to rest where it is too old or the motion was stopped."""
-        vehicle, target = self._vehicle, self.newest(self.stream, measurement.time_s)
+        vehicle = self._vehicle
+        target: TruckTarget | None = self.newest(None, measurement.time_s)
         record = self.record = self._law.step(vehicle.reading, None if self.stop_reason else target, dt_s)
         rests = record.speed_m_s == 0.0 and abs(vehicle.reading.speed_m_s) < AT_REST_M_S
         if record.failure and rests:
@@ -55,7 +53,7 @@ class TruckStream(Motion):
         return Command((*speeds, record.steering_rate_rad_s * vehicle.arm_m))
 
     def progress(self) -> dict[str, Any]:
-        """What is commanded, the limits that are active, and the age of the last value."""
+        """What is commanded, and the limits that are active."""
         record = self.record
         if record is None:
             return {"phase": "enabling"}
@@ -66,5 +64,4 @@ class TruckStream(Motion):
             "steering_deg": round(math.degrees(self._vehicle.reading.steering_rad), 3),
             "steering_target_deg": None if asked is None else round(math.degrees(asked), 3),
             "limits_active": list(record.limits_active),
-            "value_age_ms": self.stream.age_ms,
         }
