@@ -13,6 +13,7 @@ import pytest
 
 from daemon.api.server import Server
 from daemon.cli.main import main
+from vcan_tests.daemon import fake_backend
 from vcan_tests.daemon.cli.shell import canhelm, run
 from vcan_tests.daemon.fake_backend import FakeBackend
 
@@ -193,6 +194,7 @@ def test_a_motion_without_an_end_says_so_on_a_terminal(
     server: Server, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setattr(fake_backend, "ENDLESS_S", 0.1)
     assert main(["drive", "rotate", "90"]) == 0
     assert "rate_deg_s 90: without --duration this goes on until Ctrl-C or" in capsys.readouterr().err
     assert main(["drive", "rotate", "90", "--duration", "1"]) == 0
