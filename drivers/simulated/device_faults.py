@@ -9,10 +9,10 @@ from math import inf, radians
 from random import Random
 
 from canhelm.errors import UsageError
-from drivers.bus.wire_time import frame_bits
 from drivers.canopen.objects import parse_address
 from drivers.epos.codes import EMERGENCIES
 from drivers.simulated.bus import SimulatedBus, SimulatedPort
+from drivers.simulated.dictionary import Address, Value
 from drivers.simulated.encoder import SimulatedEncoder
 from drivers.simulated.epos import SimulatedEpos
 from drivers.simulated.network import SimulatedNetwork
@@ -86,8 +86,14 @@ def _node_reset(site: Site, fault: Fault, _: Random) -> Effect:
 
 
 def _power_cycle(site: Site, fault: Fault, _: Random) -> Effect:
-    node = _node_of(site, fault)
-    return Effect(node.power_off, node.power_on, fault.for_s or POWER_CYCLE_S)
+    node, had_power = _node_of(site, fault), False
+
+    def begin() -> None:
+        nonlocal had_power
+        had_power = node.powered
+        node.power_off()
+
+    return Effect(begin, lambda: node.power_on() if had_power else None, fault.for_s or POWER_CYCLE_S)
 
 
 def _emcy(site: Site, fault: Fault, _: Random) -> Effect:
@@ -98,27 +104,43 @@ def _emcy(site: Site, fault: Fault, _: Random) -> Effect:
     return Effect(lambda: node.trigger_fault(code, lasting=lasting), lambda: node.clear_cause(code))
 
 
+class _Lie:
+    """What an object says instead of the truth; a later one takes its place."""
+
+    def __init__(self, readers: dict[Address, Callable[[], Value]], address: Address, said: Value) -> None:
+        self._readers, self._address, self._said = readers, address, said
+        self._truth: Callable[[], Value] | None = None
+
+    def __call__(self) -> Value:
+        return self._said
+
+    def begin(self) -> None:
+        """Let the object say it."""
+        before = self._readers.get(self._address)
+        self._truth = before._truth if isinstance(before, _Lie) else before
+        self._readers[self._address] = self
+
+    def end(self) -> None:
+        """Let the object tell the truth again, unless it says something else meanwhile."""
+        if self._readers.get(self._address) is self:
+            del self._readers[self._address]
+            if self._truth is not None:
+                self._readers[self._address] = self._truth
+
+
 def _wrong_identity(site: Site, fault: Fault, _: Random) -> Effect:
-    node = _node_of(site, fault)
+    dictionary = _node_of(site, fault).dictionary
     address = parse_address(fault.object or _IDENTITY) or (0, 0)
-    readers = node.dictionary.readers
-    if address not in node.dictionary.objects:
-        remedy = "give one that it has, as `canhelm object` lists them"
-        raise UsageError(
-            f"{fault.part} has no object {fault.object}", object="object", value=fault.object, remedy=remedy
-        )
-    truth = readers.get(address)
-    said = fault.value
+    if address not in dictionary.objects:
+        what = f"{fault.part} has no object {fault.object}"
+        remedy = "give one that it has, as `canhelm object list` lists them"
+        raise UsageError(what, object="object", value=fault.object, remedy=remedy)
+    said: Value | None = fault.value
     if said is None:
-        before = node.dictionary.getter(address)()
+        before = dictionary.getter(address)()
         said = before + 1 if isinstance(before, int) else 0
-
-    def end() -> None:
-        del readers[address]
-        if truth is not None:
-            readers[address] = truth
-
-    return Effect(lambda: readers.__setitem__(address, lambda: said), end)
+    lie = _Lie(dictionary.readers, address, said)
+    return Effect(lie.begin, lie.end)
 
 
 class _Babbler:
@@ -128,7 +150,6 @@ class _Babbler:
         self._medium = site.medium
         self._can_id = _BABBLE_ID if fault.cob_id is None else fault.cob_id
         self._name = f"{fault.part} (babbling)"
-        self._bits = frame_bits(self._can_id, _BABBLE)
         self._port: SimulatedPort | None = None
         self._timer: asyncio.TimerHandle | None = None
 
