@@ -69,6 +69,7 @@ class PadDriver:
             while not pad.gone:
                 await self._step(pad)
                 await pad.wait(PERIOD_S)
+            self._look_at_buttons(pad)
         finally:
             self._let_go()
             await asyncio.gather(*self._errands, return_exceptions=True)

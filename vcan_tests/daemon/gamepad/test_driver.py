@@ -153,6 +153,18 @@ async def test_a_pad_that_has_gone_stops_the_motion_at_once(hands: Hands) -> Non
     assert hands.told[-1] == "Recorded Pad has gone (No such device): the robot is at rest"
 
 
+async def test_an_emergency_stop_pressed_while_an_answer_is_waited_for_counts_on_a_pad_that_goes_then(
+    hands: Hands,
+) -> None:
+    await hands.begin()
+    hands.daemon.delay_s = 0.5
+    await asyncio.sleep(0.1)
+    hands.held.press("BTN_EAST")
+    hands.held.pad.lose("No such device")
+    await hands.driving
+    assert len(hands.daemon.asked("estop")) == 1
+
+
 async def test_a_pad_that_comes_back_with_its_button_held_does_not_drive(hands: Hands) -> None:
     await hands.begin()
     hands.held.pad.lose("No such device")
