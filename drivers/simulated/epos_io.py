@@ -9,8 +9,6 @@ from drivers.simulated.dictionary import SimulatedDictionary
 INPUTS = range(1, 7)
 OUTPUTS = range(1, 5)
 NEGATIVE_LIMIT, POSITIVE_LIMIT, POSITION_MARKER = 0, 1, 3
-_READY = 0
-"""Output function "ready"."""
 _BOTH_EDGES, _RISING = 0, 1
 
 

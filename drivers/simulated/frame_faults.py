@@ -16,8 +16,8 @@ from profiles.faults import Fault
 GENERAL_ERROR = 0x0800_0000
 """SDO abort code of a fault that names none."""
 _ABORT = struct.Struct("<B3sI")
-_FIRST_PDO, _FIRST_SDO, _FIRST_REQUEST, _FIRST_GUARDING = 0x180, 0x580, 0x600, 0x680
-"""Identifiers of the predefined connection set (CiA 301 7.3.5): TPDO1, SDO answers, SDO requests, none of both."""
+_FIRST_PDO, _FIRST_SDO, _BEYOND_SDO = 0x180, 0x580, 0x680
+"""Identifiers of the predefined connection set (CiA 301 7.3.5): TPDO1, SDO answers, and behind SDO requests."""
 _NODE_MASK = 0x7F
 _INITIATING = {0x20: 0xE0, 0x40: 0xE0, 0xA0: 0xE3, 0xC0: 0xE1}
 """Client commands that begin an SDO transfer and name its object, and the bits that tell them (CiA 301 7.2.4.3)."""
@@ -91,7 +91,7 @@ class FrameFault:
             return False
         if self._node is not None and self._sender is None and not _concerns(self._node, number, data):
             return False
-        return self._object is None or (_FIRST_SDO < number < _FIRST_GUARDING and data[1:4] == self._object)
+        return self._object is None or (_FIRST_SDO < number < _BEYOND_SDO and data[1:4] == self._object)
 
     def _is_kind(self, can_id: int) -> bool:
         if self.kind in ("pdo_short", "pdo_long"):
