@@ -62,11 +62,6 @@ EMPTY = b"\r\n"
 """The answer to an empty line or a comment."""
 
 
-def make_ok(sequence: int) -> bytes:
-    """The answer to a command that was carried out and has no value."""
-    return make_value(sequence, "OK")
-
-
 def make_value(sequence: int, text: str) -> bytes:
     """The answer with a value. Lines of a longer text are parted by ``\\n``; the ``\\r\\n`` at the end ends it."""
     return f"[{sequence}] {text}\r\n".encode("latin-1", "replace")

@@ -10,17 +10,6 @@ EMCY_COB_ID = 0x080
 _EMCY = struct.Struct("<HB5s")
 
 
-def make_emcy(code: int, register: int, vendor: bytes = b"") -> bytes:
-    """The data of an emergency message.
-
-    Args:
-        code: emergency error code, 16 bit; 0 when all errors are gone.
-        register: error register (object 0x1001).
-        vendor: up to 5 bytes of the maker's own.
-    """
-    return _EMCY.pack(code, register, vendor)
-
-
 def parse_emcy(data: bytes) -> tuple[int, int, bytes] | None:
     """Code, error register and the maker's 5 bytes; None where the length is wrong."""
     return _EMCY.unpack(data) if len(data) == _EMCY.size else None

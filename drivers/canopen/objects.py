@@ -151,7 +151,6 @@ class ObjectTable:
         self.objects = objects
         self.by_address = {(entry.index, entry.sub): entry for entry in objects}
         self.by_name = {entry.name: entry for entry in objects}
-        self.indices = frozenset(entry.index for entry in objects)
         if not len(objects) == len(self.by_address) == len(self.by_name):
             raise ValueError("an object dictionary holds an address or a name twice")
 

@@ -36,16 +36,6 @@ DRIVING_MODES = {
 """Modes for driving by their name in a profile."""
 
 
-def parse_tpdo1(data: bytes) -> tuple[int, int, int] | None:
-    """Statusword, position in qc and current in mA; None where the length is wrong."""
-    return TPDO1.unpack(data) if len(data) == TPDO1_BYTES else None
-
-
-def make_rpdo1(controlword: int, target_rpm: int) -> bytes:
-    """Controlword and target speed of the driving mode."""
-    return RPDO1.pack(controlword, target_rpm)
-
-
 def make_rpdo3(controlword: int, mode: int) -> bytes:
     """Controlword and mode of operation."""
     return RPDO3.pack(controlword, mode)

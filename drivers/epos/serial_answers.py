@@ -13,7 +13,6 @@ from drivers.epos.serial_frames import (
     MAX_SEGMENT_BYTES,
     MORE_BIT,
     TOGGLE_BIT,
-    UNANSWERED,
     Frame,
     Opcode,
     make_frame,
@@ -119,19 +118,3 @@ def _segment(rest: bytes) -> Answer | str:
     if len(rest) != 1 + length + (1 + length & 1):
         return "length of the segment and of the frame differ"
     return Answer(data=rest[1 : 1 + length], toggle=rest[0] >> 6 & 1, more=bool(rest[0] & MORE_BIT))
-
-
-_ANSWER_BYTES = {Opcode.READ_OBJECT: 12, Opcode.SEGMENT_WRITE: 10, Opcode.REQUEST_CAN_FRAME: 16}
-_DONE_BYTES = 8
-
-
-def exchange_bytes(request: bytes) -> tuple[int, int]:
-    """Bytes on the line for one exchange without trouble, the acknowledges included.
-
-    Returns:
-        Bytes from the host and bytes from the drive; a segment that is read counts with its full 63 bytes.
-    """
-    if request[0] in UNANSWERED:
-        return len(request), 2
-    answer = 72 if request[0] == Opcode.SEGMENT_READ else _ANSWER_BYTES.get(Opcode(request[0]), _DONE_BYTES)
-    return len(request) + 2, answer + 2

@@ -96,11 +96,6 @@ class Max2dWorld(BodyWorld):
         """True rim speeds less rolling speeds of wheels 1 to 4."""
         return tuple(wheel.contact.slip_m_s for wheel in self.wheels.values())
 
-    @property
-    def force_n(self) -> tuple[tuple[float, float], ...]:
-        """Forces of the floor on wheels 1 to 4, along and to the left of their headings."""
-        return tuple((wheel.contact.force_x_n, wheel.contact.force_y_n) for wheel in self.wheels.values())
-
     def heading_rad(self, pair: str) -> float:
         """True heading of a wheel pair by its encoder's name."""
         return self.pairs[pair].heading_rad

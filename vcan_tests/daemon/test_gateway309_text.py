@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from daemon.api.gateway309_answers import ERROR_TEXTS, ErrorNumber, make_abort, make_error, make_ok, make_value
+from daemon.api.gateway309_answers import ERROR_TEXTS, ErrorNumber, make_abort, make_error, make_value
 from daemon.api.gateway309_help import HELP
 from daemon.api.gateway309_text import (
     MAX_LINE_BYTES,
@@ -261,7 +261,7 @@ def test_a_real_is_printed_to_six_digits(value: float) -> None:
 
 
 def test_answers_have_the_forms_that_clients_look_for() -> None:
-    assert make_ok(4) == b"[4] OK\r\n"
+    assert make_value(4, "OK") == b"[4] OK\r\n"
     assert make_value(1, "1000") == b"[1] 1000\r\n"
     assert make_error(10, ErrorNumber.NOT_SUPPORTED).startswith(b"[10] ERROR:100 #")
     assert make_abort(5, 0x06020000).startswith(b"[5] ERROR:0x06020000 #")
@@ -297,7 +297,7 @@ def test_cocomm_shows_the_whole_help(topic: str) -> None:
 
 
 def test_cocomm_tells_success_errors_and_values_apart() -> None:
-    assert cocomm(make_ok(1)) == Heard("ok")
+    assert cocomm(make_value(1, "OK")) == Heard("ok")
     assert cocomm(make_error(1, ErrorNumber.TIME_OUT)) == Heard("error")
     assert cocomm(make_abort(1, 0x05040000)) == Heard("error")
     assert cocomm(make_value(4294967295, "E8 03")) == Heard("value", "E8 03")

@@ -213,9 +213,9 @@ def test_a_wheel_that_drifts_left_has_a_positive_slip_angle_and_a_force_to_the_r
     robot.speed_up(*[0.5] * 4)
     robot.world.set_heading("front", -0.3)
     robot.roll(*[0.5] * 4, for_s=0.02)
-    front_left = 2
-    assert robot.world.slip_angle_rad[front_left] > 0.02
-    assert robot.world.force_n[front_left][1] < -1.0
+    contact = robot.world.wheels["front_left"].contact
+    assert contact.slip_angle_rad > 0.02
+    assert contact.force_y_n < -1.0
 
 
 def test_a_spinning_wheel_has_a_positive_slip_ratio() -> None:

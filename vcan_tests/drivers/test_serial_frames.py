@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from drivers.epos.serial_answers import (
     Answer,
-    exchange_bytes,
     make_can_frame_answer,
     make_done_answer,
     make_read_answer,
@@ -188,14 +187,6 @@ def test_a_published_answer_is_made_byte_for_byte(text: str, made: bytes, reques
 @pytest.mark.parametrize(("text", "made", "request_", "answer"), ANSWERS)
 def test_a_published_answer_is_read(text: str, made: bytes, request_: bytes, answer: Answer) -> None:
     assert parse_answer(request_, frame_of(bytes.fromhex(text))) == answer
-
-
-def test_a_read_takes_24_bytes_on_the_line() -> None:
-    assert exchange_bytes(make_read_object(1, 0x6041, 0)) == (10, 14)
-
-
-def test_an_nmt_command_takes_ten_bytes_on_the_line() -> None:
-    assert exchange_bytes(make_send_nmt(0, 1)) == (8, 2)
 
 
 # Round trips
