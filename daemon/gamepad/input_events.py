@@ -29,11 +29,6 @@ class Event(NamedTuple):
     value: int
 
 
-def make_event(event: Event) -> bytes:
-    """An event as the kernel writes it, at time zero."""
-    return EVENT.pack(0, 0, *event)
-
-
 def parse_events(data: bytes) -> Iterator[Event]:
     """The events in what was read; half an event at the end, which no kernel sends, is left out."""
     whole = len(data) - len(data) % EVENT.size

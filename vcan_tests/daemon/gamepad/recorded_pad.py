@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import copy
 
-from daemon.gamepad.input_events import (
-    EV_ABS,
-    EV_KEY,
-    EV_SYN,
-    SYN_REPORT,
-    Event,
-    make_event,
-)
+from daemon.gamepad.input_events import EV_ABS, EV_KEY, EV_SYN, EVENT, SYN_REPORT, Event
 from daemon.gamepad.pad import Pad, Snapshot
 from profiles.gamepad_codes import AXES, BUTTONS
 
 STICKS = ("ABS_X", "ABS_Y", "ABS_RX", "ABS_RY")
 FULL = 32767
+
+
+def make_event(event: Event) -> bytes:
+    """An event as the kernel writes it, at time zero."""
+    return EVENT.pack(0, 0, *event)
+
+
 REPORT = make_event(Event(EV_SYN, SYN_REPORT, 0))
 
 

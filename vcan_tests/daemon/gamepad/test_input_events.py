@@ -12,10 +12,10 @@ from daemon.gamepad.input_events import (
     Event,
     absinfo_request,
     keys_request,
-    make_event,
     parse_bits,
     parse_events,
 )
+from vcan_tests.daemon.gamepad.recorded_pad import make_event
 
 EVENTS = st.builds(
     Event, type=st.integers(0, 0xFFFF), code=st.integers(0, 0xFFFF), value=st.integers(-(2**31), 2**31 - 1)

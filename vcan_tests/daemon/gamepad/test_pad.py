@@ -9,9 +9,9 @@ from contextlib import contextmanager
 
 import pytest
 
-from daemon.gamepad.input_events import EV_ABS, EV_SYN, SYN_DROPPED, Event, make_event
+from daemon.gamepad.input_events import EV_ABS, EV_SYN, SYN_DROPPED, Event
 from daemon.gamepad.pad import Pad, watched
-from vcan_tests.daemon.gamepad.recorded_pad import FULL, REPORT, RecordedPad
+from vcan_tests.daemon.gamepad.recorded_pad import FULL, REPORT, RecordedPad, make_event
 
 
 @pytest.fixture
