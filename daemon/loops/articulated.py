@@ -193,18 +193,6 @@ class ArticulatedVehicle:
             poses.append(pose)
         return tuple(poses)
 
-    def stable_bendings(self, steering_rad: float) -> tuple[float, ...] | None:
-        """The bending angles of normal stable motion; None when a hitch has none."""
-        curvature: float | None = self.curvature(steering_rad)
-        bendings: list[float] = []
-        for hitch in self.hitches:
-            bending = None if curvature is None else hitch.stable_bending(curvature)
-            if curvature is None or bending is None:
-                return None
-            bendings.append(bending)
-            curvature = hitch.rear_curvature(curvature)
-        return tuple(bendings)
-
     @property
     def stable_curvature(self) -> float:
         """Highest curvature of the truck with stable motion of all units within steering and bending limits [1/m]."""

@@ -29,11 +29,6 @@ class PoseGains:
         """Whether the goal is approached from near (the law linearised about it)."""
         return self.rho > 0 and self.beta < 0 and self.alpha > self.rho
 
-    @property
-    def strongly_stable(self) -> bool:
-        """Whether the robot never turns round on its way (Siegwart and Nourbakhsh, equation 3.60)."""
-        return self.stable and self.alpha + 5 * self.beta / 3 - 2 * self.rho / math.pi > 0
-
 
 REPORT_GAINS: Final = PoseGains(3.0, 8.0, -1.5)
 """Those of the NXT report's calls, for a cycle of 0.2 s at most."""

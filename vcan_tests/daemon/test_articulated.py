@@ -66,7 +66,7 @@ def test_a_hitch_above_the_axle_is_the_limit_of_hitches_near_it(curvature: float
 
 
 def test_straight_motion_is_an_ordinary_case() -> None:
-    assert SEMITRAILER.stable_bendings(0.0) == (0.0,)
+    assert HITCH.stable_bending(0.0) == 0.0
     assert HITCH.bending_for(0.0) == 0.0
     assert HITCH.stable_bending(0.0, extreme=True) == pytest.approx(-math.pi)
 
@@ -86,8 +86,8 @@ def test_the_bending_angle_at_the_turning_angle_is_not_the_published_one() -> No
 
 
 def test_beyond_the_turning_angle_nothing_is_stable() -> None:
-    assert SEMITRAILER.stable_bendings(math.radians(19.3)) is None
-    assert HITCH.stable_bending(SEMITRAILER.curvature(math.radians(19.3)), extreme=True) is None
+    beyond = SEMITRAILER.curvature(math.radians(19.3))
+    assert HITCH.stable_bending(beyond) is HITCH.stable_bending(beyond, extreme=True) is None
 
 
 def test_the_printed_bending_angle_of_stable_motion_has_the_wrong_sign() -> None:
@@ -125,10 +125,22 @@ def test_a_truck_alone_has_no_jackknife() -> None:
     assert ArticulatedVehicle(0.2, (), 0.5).jackknife_margin([]) == math.inf
 
 
+def stable_bendings(curvature: float | None) -> tuple[float, ...] | None:
+    """Bending angles of the train where its truck goes on with this curvature; None where a hitch has none."""
+    bendings = []
+    for hitch in TRAIN.hitches:
+        bending = None if curvature is None else hitch.stable_bending(curvature)
+        if curvature is None or bending is None:
+            return None
+        bendings.append(bending)
+        curvature = hitch.rear_curvature(curvature)
+    return tuple(bendings)
+
+
 def test_the_stable_limit_of_a_train_is_where_its_first_unit_turns_on_the_spot_or_bends_too_far() -> None:
     curvature = TRAIN.stable_curvature
-    inside = TRAIN.stable_bendings(TRAIN.steering(curvature * (1 - 1e-9)))
-    outside = TRAIN.stable_bendings(TRAIN.steering(curvature * (1 + 1e-6)))
+    inside = stable_bendings(curvature * (1 - 1e-9))
+    outside = stable_bendings(curvature * (1 + 1e-6))
     assert inside is not None
     assert max(map(abs, inside)) == pytest.approx(TRAIN.max_bending_rad, abs=1e-6)
     assert outside is None or max(map(abs, outside)) > TRAIN.max_bending_rad

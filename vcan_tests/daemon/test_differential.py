@@ -261,10 +261,11 @@ def test_gains_that_lead_nowhere_are_refused() -> None:
         GoalSeeker(DRIVE, Pose(), SeekSettings(TIGHT, 1.0, 1.0, PoseGains(3, 8, 1.5)))
 
 
-def test_the_published_gains_are_strongly_stable() -> None:
-    assert REPORT_GAINS.strongly_stable
-    assert SLOW_CYCLE_GAINS.strongly_stable
-    assert not PoseGains(3, 4, -1.5).strongly_stable
+@pytest.mark.parametrize("gains", [REPORT_GAINS, SLOW_CYCLE_GAINS], ids=["report", "slow"])
+def test_with_the_published_gains_the_robot_never_turns_round(gains: PoseGains) -> None:
+    """Strong stability (Siegwart and Nourbakhsh, equation 3.60)."""
+    assert gains.stable
+    assert gains.alpha + 5 * gains.beta / 3 - 2 * gains.rho / math.pi > 0
 
 
 def test_a_wheel_follows_its_motor_only_once_the_play_is_used_up() -> None:

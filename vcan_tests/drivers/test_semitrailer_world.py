@@ -45,9 +45,9 @@ def driving(speed_m_s: float, steering_deg: float, bending_deg: float = 0.0) -> 
 def test_it_takes_the_bending_angle_of_stable_motion(steering_deg: float) -> None:
     world = driving(0.15, steering_deg)
     world.advance(25.0)
-    stable = KINEMATICS.stable_bendings(math.radians(steering_deg))
+    stable = KINEMATICS.hitches[0].stable_bending(KINEMATICS.curvature(math.radians(steering_deg)))
     assert stable is not None
-    assert math.degrees(world.bending_rad - stable[0]) == pytest.approx(0.0, abs=0.7)
+    assert math.degrees(world.bending_rad - stable) == pytest.approx(0.0, abs=0.7)
     forward, _, yaw_rate = world.velocity
     assert yaw_rate / forward == pytest.approx(KINEMATICS.curvature(math.radians(steering_deg)), rel=0.01)
 
