@@ -131,7 +131,8 @@ async def _boot(app: App) -> None:
 
     app.supervisor.observers.append(look)
     try:
-        await asyncio.wait_for(ready, BOOT_DEADLINE_S)
+        async with asyncio.timeout(BOOT_DEADLINE_S):
+            await ready
     except TimeoutError:
         message = f"the robot did not boot in {BOOT_DEADLINE_S:g} s: {app.supervisor.message}"
         raise Timeout(message, remedy="switch its power on; another daemon on this bus must not run") from None

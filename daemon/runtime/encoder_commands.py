@@ -145,7 +145,8 @@ class EncoderCommands:
 
         self._supervisor.observers.append(look)
         try:
-            await asyncio.wait_for(ready, RESTART_S)
+            async with asyncio.timeout(RESTART_S):
+                await ready
         except TimeoutError:
             raise Timeout(
                 f"{encoder.who} did not come back within {RESTART_S:g} s", node=encoder.node, remedy="`canhelm status`"

@@ -92,7 +92,8 @@ class Localiser:
             NotReady: none has within ``FIRST_FIX_S``.
         """
         try:
-            await asyncio.wait_for(self._located.wait(), FIRST_FIX_S)
+            async with asyncio.timeout(FIRST_FIX_S):
+                await self._located.wait()
         except TimeoutError:
             what = "the vehicle does not know yet where it is: no scan has shown three reflectors"
             remedy = "see that the scanner runs and sees them; `canhelm status --json` has localisation"

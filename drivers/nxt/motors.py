@@ -246,7 +246,8 @@ class MotorCycle:
         self.rounds += 1
         self._given.clear()
         with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(self._given.wait(), TARGETS_WITHIN_S)
+            async with asyncio.timeout(TARGETS_WITHIN_S):  # wait_for loses a cancellation at the moment that it ends
+                await self._given.wait()
             self._send()
 
     def _send(self) -> None:
