@@ -9,6 +9,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
+from canhelm.errors import CanhelmError
 from daemon.app import App
 from daemon.runs.store import RunStore
 from drivers.simulated.network import SimulatedNetwork
@@ -37,6 +38,17 @@ class Robot:
             self.lease = self.app.service.open_lease("test")
             self._renewing = asyncio.create_task(self._renew(self.lease))
         return await self.app.service.call(method, params, self.lease)
+
+    def begin(self, method: str, /, **params: Any) -> asyncio.Task[Any]:
+        """A command of a client that takes its answer, error or not, for what it is."""
+
+        async def ask() -> dict[str, Any] | CanhelmError:
+            try:
+                return await self.call(method, **params)
+            except CanhelmError as error:
+                return error
+
+        return asyncio.create_task(ask())
 
     async def _renew(self, lease: str) -> None:
         while True:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from math import degrees
 from pathlib import Path
 from typing import Any
@@ -25,22 +27,14 @@ REST_S = 1.5
 """From a fault at 0.4 m/s until every wheel stands: noticing it, and the quick-stop ramp, with a margin."""
 
 
-def _begin(robot: Robot, method: str, **params: Any) -> asyncio.Task[Any]:
-    """A command of a client that takes its answer, error or not, for what it is."""
-
-    async def ask() -> dict[str, Any] | CanhelmError:
-        try:
-            return await robot.call(method, **params)
-        except CanhelmError as error:
-            return error
-
-    return asyncio.create_task(ask())
-
-
-async def _driving(robot: Robot) -> asyncio.Task[Any]:
-    driving = _begin(robot, "drive.parallel", angle_deg=0.0, speed_m_s=0.4, duration_s=2.0)
-    await robot.until(lambda: robot.speed_m_s > 0.38)
-    return driving
+@asynccontextmanager
+async def _struck(**fault: Any) -> AsyncIterator[tuple[Robot, asyncio.Task[Any]]]:
+    """A robot that was driving when a fault struck it, and its motion."""
+    async with running_robot(expect_errors=True) as robot:
+        driving = robot.begin("drive.parallel", angle_deg=0.0, speed_m_s=0.4, duration_s=2.0)
+        await robot.until(lambda: robot.speed_m_s > 0.38)
+        await robot.call("simulation.fault", **fault)
+        yield robot, driving
 
 
 STOPS: list[tuple[dict[str, Any], str]] = [
@@ -69,9 +63,7 @@ STOPS: list[tuple[dict[str, Any], str]] = [
 async def test_a_fault_while_driving_stops_the_robot_by_name_and_a_reset_gets_it_going(
     fault: dict[str, Any], told: str
 ) -> None:
-    async with running_robot(expect_errors=True) as robot:
-        driving = await _driving(robot)
-        await robot.call("simulation.fault", **fault)
+    async with _struck(**fault) as (robot, driving):
         await robot.until(lambda: robot.state == "fault", 0.5)
         await robot.until(lambda: robot.fastest_wheel_m_s < 0.01, REST_S)
         error = await driving
@@ -92,11 +84,9 @@ async def test_a_fault_while_driving_stops_the_robot_by_name_and_a_reset_gets_it
 async def test_a_drive_that_gets_no_pdos_is_stopped_and_switched_off_by_sdo(
     fault: dict[str, Any], command: str
 ) -> None:
-    async with running_robot(expect_errors=True) as robot:
-        driving = await _driving(robot)
-        await robot.call("simulation.fault", **fault)
+    async with _struck(**fault) as (robot, driving):
         await robot.call("simulation.fault", kind="lose", cob_id=0x403)
-        _begin(robot, command)
+        robot.begin(command)
         await robot.until(lambda: robot.fastest_wheel_m_s < 0.01, REST_S)
         await driving
         await robot.until(lambda: not robot.network.drives["front_left"].motion.powered, 4.0)
@@ -106,9 +96,7 @@ async def test_a_drive_that_gets_no_pdos_is_stopped_and_switched_off_by_sdo(
 
 
 async def test_a_motion_whose_drive_gets_no_pdos_ends_in_a_fault_with_the_drive_off() -> None:
-    async with running_robot(expect_errors=True) as robot:
-        driving = await _driving(robot)
-        await robot.call("simulation.fault", kind="lose", cob_id=0x203)
+    async with _struck(kind="lose", cob_id=0x203) as (robot, driving):
         await driving
         assert robot.state == "fault"
         assert "does not follow its PDOs" in robot.app.service.status()["message"]
@@ -121,7 +109,7 @@ async def test_a_drive_that_can_be_told_nothing_is_switched_off_by_restarting_it
         await robot.call("motor.enable", node=3)
         await robot.call("simulation.fault", kind="lose", cob_id=0x203)
         await robot.call("simulation.fault", kind="sdo_abort", part="front_left")
-        await _begin(robot, "motor.disable", node=3)
+        await robot.begin("motor.disable", node=3)
         await robot.until(lambda: not robot.network.drives["front_left"].motion.powered, 0.1)
         told = [event["message"] for event in robot.app.supervisor.log.events]
         assert "node 3 (front_left) does not follow its PDOs and was switched off by restarting its node" in told
@@ -139,9 +127,7 @@ async def test_a_drive_that_can_be_told_nothing_is_switched_off_by_restarting_it
     ids=lambda fault: fault["kind"],
 )
 async def test_a_robot_drives_on_where_a_fault_is_small(fault: dict[str, Any]) -> None:
-    async with running_robot(expect_errors=True) as robot:
-        driving = await _driving(robot)
-        await robot.call("simulation.fault", **fault)
+    async with _struck(**fault) as (robot, driving):
         assert "motion" in await driving
         assert (await robot.call("simulation.faults"))["faults"][0]["struck"] > 0
         assert robot.fastest_wheel_m_s < 0.01
@@ -190,7 +176,7 @@ async def test_a_drive_whose_temperature_stays_high_is_not_reset_until_it_has_co
 async def _steered(robot: Robot, fault: dict[str, Any]) -> tuple[Any, float]:
     """What steering the front pair to 30 degrees comes to, and its true heading then."""
     await robot.call("simulation.fault", **fault)
-    answer = await _begin(robot, "steer", pair="front", angle_deg=30.0)
+    answer = await robot.begin("steer", pair="front", angle_deg=30.0)
     return answer, degrees(robot.network.world.heading_rad("front"))
 
 
@@ -232,7 +218,7 @@ async def test_a_brake_that_does_not_hold_lets_its_pair_be_pushed_until_it_is_me
 async def test_a_blocked_motor_does_not_turn_whatever_its_drive_does() -> None:
     async with running_robot(expect_errors=True) as robot:
         await robot.call("simulation.fault", kind="motor_blocked", part="front_left")
-        driving = _begin(robot, "motor.velocity", node=3, velocity_rpm=500.0, duration_s=1.0)
+        driving = robot.begin("motor.velocity", node=3, velocity_rpm=500.0, duration_s=1.0)
         await robot.until(lambda: robot.app.devices.drives["front_left"].current_a > 1.0)
         assert robot.network.world.axes["front_left"].speed_rad_s == 0.0
         await driving
@@ -243,7 +229,7 @@ async def test_a_wheel_on_ice_slips() -> None:
         world = robot.network.world
         assert isinstance(world, Max2dWorld)
         await robot.call("simulation.fault", kind="ice", part="front_left")
-        driving = _begin(robot, "drive.parallel", angle_deg=0.0, speed_m_s=0.4, duration_s=0.5)
+        driving = robot.begin("drive.parallel", angle_deg=0.0, speed_m_s=0.4, duration_s=0.5)
         slips: list[tuple[float, ...]] = []
         robot.app.supervisor.observers.append(lambda: slips.append(tuple(map(abs, world.slip_m_s))))
         await driving
@@ -260,7 +246,7 @@ async def test_a_motor_with_a_broken_encoder_is_whole_again_when_the_fault_is_cl
         await robot.call("simulation.fault", kind=kind, part="front_left", **angle)
         before_rad = axis.position_rad
         assert drive.motion.axis is not axis
-        await _begin(robot, "motor.velocity", node=3, velocity_rpm=100.0, duration_s=0.3)
+        await robot.begin("motor.velocity", node=3, velocity_rpm=100.0, duration_s=0.3)
         assert abs(axis.position_rad - before_rad) > 0.1
         await robot.call("simulation.clear_faults")
         assert drive.motion.axis is axis
@@ -273,7 +259,7 @@ async def test_a_motor_that_runs_away_is_not_left_running() -> None:
     async with running_robot(expect_errors=True) as robot:
         await robot.call("simulation.lift", lifted=True)
         await robot.call("simulation.fault", kind="encoder_reversed", part="front_left")
-        error = await _begin(robot, "motor.velocity", node=3, velocity_rpm=100.0, duration_s=0.5)
+        error = await robot.begin("motor.velocity", node=3, velocity_rpm=100.0, duration_s=0.5)
         assert isinstance(error, DeviceFault)
         assert "front_left" in error.message
         assert error.remedy
@@ -286,7 +272,7 @@ async def test_a_motor_that_runs_away_is_not_left_running() -> None:
 @pytest.mark.parametrize("fault", [{"kind": "serial_noise", "probability": 0.05}, {"kind": "unplugged"}])
 async def test_a_serial_line_that_fails_stops_the_robot(fault: dict[str, Any]) -> None:
     async with running_robot(bus="rs232", expect_errors=True) as robot:
-        driving = _begin(robot, "drive.parallel", angle_deg=0.0, speed_m_s=0.2, duration_s=20.0)
+        driving = robot.begin("drive.parallel", angle_deg=0.0, speed_m_s=0.2, duration_s=20.0)
         await robot.until(lambda: robot.speed_m_s > 0.15)
         await robot.call("simulation.fault", **fault)
         error = await driving

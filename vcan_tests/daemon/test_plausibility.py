@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import math
-from typing import Any
 
 import msgspec
 import pytest
 
-from canhelm.errors import CanhelmError, DeviceFault
+from canhelm.errors import DeviceFault
 from daemon import demo_ackermann, demo_max2d_path, demo_semitrailer
 from daemon.demo import FIGURES, Demo
 from daemon.loops.plausibility import AxisTurning, EncoderJumps, SteeredBy, Turning
@@ -80,16 +79,6 @@ def test_a_margin_of_the_profile_counts_instead_of_the_derived_one() -> None:
     assert jump_margins_rad(given, ("rear",)) == (math.radians(0.5),)
 
 
-def _begin(robot: Robot, method: str, **params: Any) -> asyncio.Task[object]:
-    async def ask() -> object:
-        try:
-            return await robot.call(method, **params)
-        except CanhelmError as error:
-            return error
-
-    return asyncio.create_task(ask())
-
-
 async def _time_to_fault(robot: Robot) -> float:
     """Until the vehicle is in fault; afterwards it comes to rest, with every power stage off."""
     noticed_s = await robot.until(lambda: robot.state == "fault", 5.0)
@@ -107,7 +96,7 @@ def _let_jump(robot: Robot, encoder: str, by_deg: float) -> None:
 @pytest.mark.parametrize("by_deg", [JUMP_LIMIT_DEG + 0.2, -JUMP_LIMIT_DEG - 0.2, 5.0, -12.0, 45.0, -90.0, 180.0])
 async def test_a_jump_while_it_drives_stops_the_robot_in_two_cycles_by_name(by_deg: float) -> None:
     async with running_robot(expect_errors=True) as robot:
-        driving = _begin(robot, "drive.parallel", angle_deg=0.0, speed_m_s=0.4, duration_s=10.0)
+        driving = robot.begin("drive.parallel", angle_deg=0.0, speed_m_s=0.4, duration_s=10.0)
         await robot.until(lambda: robot.speed_m_s > 0.3)
         _let_jump(robot, "front", by_deg)
         assert await _time_to_fault(robot) <= CYCLES_TO_NOTICE * PERIOD_S + 1e-6
@@ -121,7 +110,7 @@ async def test_a_jump_while_it_drives_stops_the_robot_in_two_cycles_by_name(by_d
 @pytest.mark.parametrize("by_deg", [-20.0, 8.0])
 async def test_a_jump_while_the_pair_turns_stops_it(by_deg: float) -> None:
     async with running_robot(expect_errors=True) as robot:
-        turning = _begin(robot, "steer", pair="rear", angle_deg=60.0)
+        turning = robot.begin("steer", pair="rear", angle_deg=60.0)
         await robot.until(lambda: robot.app.devices.encoders["rear"].heading_rad > 0.5)
         _let_jump(robot, "rear", by_deg)
         assert await _time_to_fault(robot) <= CYCLES_TO_NOTICE * PERIOD_S + 1e-6
@@ -131,7 +120,7 @@ async def test_a_jump_while_the_pair_turns_stops_it(by_deg: float) -> None:
 @pytest.mark.parametrize(("name", "encoder"), [("ackermann", "steering_angle"), ("semitrailer", "bending_angle")])
 async def test_a_jump_of_any_steered_vehicles_encoder_stops_it(name: str, encoder: str) -> None:
     async with running_robot(load(name).profile, expect_errors=True) as robot:
-        _begin(robot, "drive.set", speed_m_s=0.2, steering_deg=0.0, valid_for_ms=9000)
+        robot.begin("drive.set", speed_m_s=0.2, steering_deg=0.0, valid_for_ms=9000)
         await robot.until(lambda: robot.speed_m_s > 0.1)
         _let_jump(robot, encoder, 10.0)
         assert await _time_to_fault(robot) <= CYCLES_TO_NOTICE * PERIOD_S + 1e-6
@@ -195,7 +184,7 @@ async def _steering_fault(robot: Robot, kind: str, begin_deg: float, goal_deg: f
     await robot.call("simulation.fault", kind=kind, part="front")
     await asyncio.sleep(0.1)
     before_rad = robot.network.world.heading_rad("front")
-    steering = _begin(robot, "steer", pair="front", angle_deg=goal_deg)
+    steering = robot.begin("steer", pair="front", angle_deg=goal_deg)
     await _time_to_fault(robot)
     error = await steering
     assert isinstance(error, DeviceFault)
@@ -224,7 +213,7 @@ async def test_a_steered_axle_with_a_broken_encoder_stops_the_vehicle(name: str,
     async with running_robot(load(name).profile, expect_errors=True) as robot:
         await robot.call("simulation.fault", kind=kind, part="steering_angle")
         await asyncio.sleep(0.1)
-        _begin(robot, "drive.set", speed_m_s=0.2, steering_deg=20.0, valid_for_ms=9000)
+        robot.begin("drive.set", speed_m_s=0.2, steering_deg=20.0, valid_for_ms=9000)
         await _time_to_fault(robot)
         turned_deg = math.degrees(robot.network.world.heading_rad("steering_angle"))
         assert "steering_angle" in robot.app.supervisor.message
@@ -289,7 +278,7 @@ def test_the_semitrailer_follows_its_paths_in_peace_with_half_the_limits(figure:
 
 async def test_under_voltage_of_any_drive_stops_the_robot_by_name() -> None:
     async with running_robot(expect_errors=True) as robot:
-        driving = _begin(robot, "drive.parallel", angle_deg=0.0, speed_m_s=0.4, duration_s=10.0)
+        driving = robot.begin("drive.parallel", angle_deg=0.0, speed_m_s=0.4, duration_s=10.0)
         await robot.until(lambda: robot.speed_m_s > 0.3)
         await robot.call("simulation.fault", kind="emcy", part="rear_left", code=0x3220)
         assert await _time_to_fault(robot) <= CYCLES_TO_NOTICE * PERIOD_S + 1e-6

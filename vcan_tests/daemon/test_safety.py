@@ -22,18 +22,6 @@ LIFE_TIME_S = 0.3
 """Of the shipped robot."""
 
 
-def _begin(robot: Robot, method: str, **params: Any) -> asyncio.Task[Any]:
-    """A command of a client that takes its answer, error or not, for what it is."""
-
-    async def ask() -> dict[str, Any] | CanhelmError:
-        try:
-            return await robot.call(method, **params)
-        except CanhelmError as error:
-            return error
-
-    return asyncio.create_task(ask())
-
-
 def _twin(robot: Robot, node: int) -> SimulatedEpos:
     twin = robot.network.node(node)
     assert isinstance(twin, SimulatedEpos)
@@ -41,7 +29,7 @@ def _twin(robot: Robot, node: int) -> SimulatedEpos:
 
 
 async def _until_front_brake_is_free(robot: Robot) -> asyncio.Task[Any]:
-    steering = _begin(robot, "steer", pair="front", angle_deg=40.0)
+    steering = robot.begin("steer", pair="front", angle_deg=40.0)
     await robot.until(lambda: robot.app.devices.brakes["front"].state is BrakeState.RELEASED)
     return steering
 
@@ -103,8 +91,8 @@ async def test_a_brake_whose_switching_was_cancelled_can_be_switched_again() -> 
 @pytest.mark.parametrize("moment_s", MOMENTS_S)
 async def test_an_emergency_stop_while_a_drive_is_being_enabled_leaves_it_off(moment_s: float) -> None:
     async with running_robot(expect_errors=True) as robot:
-        enabling = _begin(robot, "motor.enable", node=1)
-        second = _begin(robot, "motor.enable", node=1)
+        enabling = robot.begin("motor.enable", node=1)
+        second = robot.begin("motor.enable", node=1)
         await asyncio.sleep(moment_s)
         await robot.call("estop")
         await asyncio.wait([enabling, second])
@@ -118,7 +106,7 @@ async def test_a_stop_while_a_move_is_being_prepared_keeps_it_from_beginning(mom
         await robot.call("motor.enable", node=1)
         axis = robot.network.world.axes["rear_right"]
         before_rad = axis.position_rad
-        moving = _begin(robot, "motor.position", node=1, position_qc=20_000, relative=True, velocity_rpm=1.0)
+        moving = robot.begin("motor.position", node=1, position_qc=20_000, relative=True, velocity_rpm=1.0)
         await asyncio.sleep(moment_s)
         await robot.call("stop")
         assert isinstance(await moving, Refused)
@@ -131,7 +119,7 @@ async def test_an_emergency_stop_during_a_reset_stays_latched() -> None:
     async with running_robot(expect_errors=True) as robot:
         _twin(robot, 2).trigger_fault(0x4210)
         await robot.until(lambda: robot.state == "fault")
-        resetting = _begin(robot, "reset")
+        resetting = robot.begin("reset")
         await asyncio.sleep(0.05)
         await robot.call("estop")
         assert isinstance(await resetting, Refused)
@@ -141,7 +129,7 @@ async def test_an_emergency_stop_during_a_reset_stays_latched() -> None:
 
 async def test_a_reset_right_after_an_emergency_stop_returns_when_the_vehicle_can_be_driven_again() -> None:
     async with running_robot(expect_errors=True) as robot:
-        driving = _begin(robot, "drive.parallel", angle_deg=0.0, speed_m_s=0.4, duration_s=5.0)
+        driving = robot.begin("drive.parallel", angle_deg=0.0, speed_m_s=0.4, duration_s=5.0)
         await robot.until(lambda: robot.speed_m_s > 0.38)
         await robot.call("estop")
         assert (await robot.call("reset"))["state"] == "idle"
@@ -161,7 +149,7 @@ async def test_a_wheel_that_settles_when_its_torque_goes_is_waited_for_at_the_en
             last.speed_m_s = 0.02  # until its next reading
 
         monkeypatch.setattr(last, "disable", disable_and_settle)
-        driving = _begin(robot, "drive.parallel", angle_deg=0.0, speed_m_s=0.3, duration_s=60.0)
+        driving = robot.begin("drive.parallel", angle_deg=0.0, speed_m_s=0.3, duration_s=60.0)
         await robot.until(lambda: robot.speed_m_s > 0.28)
         assert await robot.app.supervisor.close() == ()
         await asyncio.wait([driving])
@@ -169,7 +157,7 @@ async def test_a_wheel_that_settles_when_its_torque_goes_is_waited_for_at_the_en
 
 async def test_nothing_begins_while_the_daemon_goes_down() -> None:
     async with running_robot() as robot:
-        enabling = _begin(robot, "motor.enable", node=1)
+        enabling = robot.begin("motor.enable", node=1)
         await asyncio.sleep(0.004)
         closing = asyncio.create_task(robot.app.supervisor.close())
         await asyncio.wait([enabling, closing])
@@ -197,7 +185,7 @@ async def test_a_pair_is_not_steered_without_the_reading_of_its_encoder() -> Non
 )
 async def test_the_network_is_left_alone_while_a_motion_prepares_itself(method: str, params: dict[str, Any]) -> None:
     async with running_robot() as robot:
-        moving = _begin(robot, "motor.current", node=1, current_ma=500.0, duration_s=0.2)
+        moving = robot.begin("motor.current", node=1, current_ma=500.0, duration_s=0.2)
         await asyncio.sleep(0.002)
         with pytest.raises(Interlock):
             await robot.app.service.call(method, params, None)
@@ -207,7 +195,7 @@ async def test_the_network_is_left_alone_while_a_motion_prepares_itself(method: 
 async def test_a_move_whose_client_hangs_up_while_it_is_enabled_does_not_begin() -> None:
     async with running_robot() as robot:
         position_rad = robot.network.world.axes["rear_right"].position_rad
-        moving = _begin(robot, "motor.position", node=1, position_qc=20_000, relative=True, velocity_rpm=500.0)
+        moving = robot.begin("motor.position", node=1, position_qc=20_000, relative=True, velocity_rpm=500.0)
         await asyncio.sleep(0.01)
         assert robot.lease is not None
         robot.app.service.close_lease(robot.lease)
@@ -239,8 +227,8 @@ async def test_a_value_of_a_stream_grows_old_while_the_daemon_hangs() -> None:
 
 async def test_the_second_brake_is_not_released_where_a_drive_was_enabled_while_the_first_one_opened() -> None:
     async with running_robot() as robot:
-        releasing = _begin(robot, "brake.release", pair="all")
-        enabling = _begin(robot, "motor.enable", node="rear_left")
+        releasing = robot.begin("brake.release", pair="all")
+        enabling = robot.begin("motor.enable", node="rear_left")
         assert isinstance(await releasing, Interlock)
         assert [brake.state for brake in robot.app.devices.brakes.values()].count(BrakeState.ENGAGED) == 1
         assert not isinstance(await enabling, CanhelmError)
@@ -251,7 +239,7 @@ async def test_the_second_brake_is_not_released_where_a_drive_was_enabled_while_
 async def test_a_robot_whose_daemon_dies_stands_after_the_life_time_and_its_quick_stop_ramp(seed: int) -> None:
     async with running_robot(seed=seed, expect_errors=True) as robot:
         drives = robot.app.profile.drives.values()
-        driving = _begin(robot, "drive.parallel", angle_deg=0.0, speed_m_s=0.5, duration_s=60.0)
+        driving = robot.begin("drive.parallel", angle_deg=0.0, speed_m_s=0.5, duration_s=60.0)
         await robot.until(lambda: robot.speed_m_s > 0.49)
         await robot.app.bus.close()
         ramp_s = 0.5 / min(drive.quick_stop_m_s2 for drive in drives)
@@ -271,7 +259,7 @@ async def test_a_turning_pair_whose_daemon_dies_stands_likewise_but_for_what_its
     profile = replace(max2d, vehicle=replace(max2d.vehicle, contact_lead_m=lead_m))
     async with running_robot(profile, expect_errors=True) as robot:
         speed_m_s = profile.limits.steering_rim_speed_m_s
-        steering = _begin(robot, "steer", pair="front", angle_deg=80.0)
+        steering = robot.begin("steer", pair="front", angle_deg=80.0)
         await robot.until(lambda: robot.fastest_wheel_m_s > 0.9 * speed_m_s)
         await asyncio.sleep(moment_s)
         await robot.app.bus.close()

@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from canhelm.errors import CanhelmError, DeviceFault
+from canhelm.errors import DeviceFault
 from daemon.loops.wheels_and_body import WheelsAndBody, rows_of, wheel_limit_m
 from profiles.loader import load
 from vcan_tests.robot import running_robot
@@ -80,14 +80,7 @@ async def test_a_broken_wheel_stops_the_robot_by_name(
 ) -> None:
     async with running_robot(load(name).profile, expect_errors=True) as robot:
         direction = {"angle_deg": 0.0} if name == "max2d" else {"heading_deg": 0.0}
-
-        async def drive_on() -> object:
-            try:
-                return await robot.call(method, **direction, speed_m_s=speed_m_s, duration_s=10.0)
-            except CanhelmError as error:
-                return error
-
-        driving = asyncio.create_task(drive_on())
+        driving = robot.begin(method, **direction, speed_m_s=speed_m_s, duration_s=10.0)
         await robot.until(lambda: robot.speed_m_s > 0.9 * speed_m_s)
         await robot.call("simulation.fault", kind=kind, part=part)
         x, y, _ = robot.network.world.pose
