@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
+from collections.abc import Callable
 from selectors import SelectorKey, SelectSelector
 
 import pytest
@@ -291,27 +292,26 @@ def test_a_patient_clock_never_goes_back() -> None:
     assert times == sorted(times)
 
 
-def test_no_tick_of_a_patient_clock_is_missed_where_the_machine_stood_still() -> None:
+def patient_ticks(each: Callable[[float], None], for_s: float) -> Ticker:
+    """A ticker of 20 ms after a while in which each tick took 50 ms."""
+
     async def tick() -> Ticker:
-        ticker = Ticker(0.02, lambda: block(0.05))
+        ticker = Ticker(0.02, lambda: each(0.05))
         ticker.start()
-        await asyncio.sleep(0.13)
+        await asyncio.sleep(for_s)
         ticker.stop()
         return ticker
 
-    ticker = run_patient(tick())
+    return run_patient(tick())
+
+
+def test_no_tick_of_a_patient_clock_is_missed_where_the_machine_stood_still() -> None:
+    ticker = patient_ticks(block, 0.13)
     assert (ticker.ticks, ticker.missed) == (6, 0)
 
 
 def test_ticks_of_a_patient_clock_are_missed_where_the_process_computes_too_long() -> None:
-    async def tick() -> Ticker:
-        ticker = Ticker(0.02, lambda: compute(0.05))
-        ticker.start()
-        await asyncio.sleep(0.3)
-        ticker.stop()
-        return ticker
-
-    ticker = run_patient(tick())
+    ticker = patient_ticks(compute, 0.3)
     assert ticker.missed >= ticker.ticks
     assert ticker.late >= 1
 

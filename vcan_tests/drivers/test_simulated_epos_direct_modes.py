@@ -61,10 +61,17 @@ async def test_a_measured_current_has_noise_that_the_seed_decides() -> None:
     assert len(set(values[0])) > 3
 
 
-async def test_too_much_speed_in_current_mode_is_a_fault_that_cuts_the_power() -> None:
+async def limited(limits: dict[int, int]) -> Bench:
+    """A drive in current mode; limits of object 0x6410 by their sub-index."""
     bench = await Bench.booted()
-    await bench.u16(0x6410, 4, 500)
+    for sub, value in limits.items():
+        await bench.u16(0x6410, sub, value)
     await bench.enable(CURRENT)
+    return bench
+
+
+async def test_too_much_speed_in_current_mode_is_a_fault_that_cuts_the_power() -> None:
+    bench = await limited({4: 500})
     await bench.u16(0x2030, 0, 1000)
     await asyncio.sleep(0.5)
     assert bench.emergencies() == [0xFF05]
@@ -75,9 +82,7 @@ async def test_too_much_speed_in_current_mode_is_a_fault_that_cuts_the_power() -
 
 
 async def test_the_output_current_limit_holds() -> None:
-    bench = await Bench.booted()
-    await bench.u16(0x6410, 2, 800)
-    await bench.enable(CURRENT)
+    bench = await limited({2: 800})
     await bench.u16(0x2030, 0, 3000)
     await asyncio.sleep(0.01)
     await bench.read(0x6041)
@@ -85,11 +90,8 @@ async def test_the_output_current_limit_holds() -> None:
 
 
 async def test_a_warm_winding_gets_the_continuous_current_only() -> None:
-    bench = await Bench.booted()
+    bench = await limited({1: 1000, 2: 2000, 5: 10})
     bench.world.blocked = True
-    for sub, value in ((1, 1000), (2, 2000), (5, 10)):
-        await bench.u16(0x6410, sub, value)
-    await bench.enable(CURRENT)
     await bench.u16(0x2030, 0, 2000)
     await asyncio.sleep(0.2)
     await bench.read(0x6041)

@@ -54,19 +54,22 @@ async def test_pdos_rest_before_the_node_is_started() -> None:
     assert await bench.read(0x6061) == 1
 
 
-async def test_an_rpdo_of_type_255_acts_at_once() -> None:
-    bench = await Bench.booted()
+async def mode_after_rpdo3(bench: Bench) -> int:
+    """Start the node and ask for mode 3 by RPDO3; the mode that it is in then."""
     await bench.master.nmt(START, 1)
     await bench.master.send(RPDO3, "060003")
-    assert (await bench.read(0x6061), await bench.state()) == (3, 0x121)
+    return await bench.read(0x6061)
+
+
+async def test_an_rpdo_of_type_255_acts_at_once() -> None:
+    bench = await Bench.booted()
+    assert (await mode_after_rpdo3(bench), await bench.state()) == (3, 0x121)
 
 
 async def test_an_rpdo_of_type_1_waits_for_the_sync() -> None:
     bench = await Bench.booted()
     await bench.u8(0x1402, 2, 1)
-    await bench.master.nmt(START, 1)
-    await bench.master.send(RPDO3, "060003")
-    assert await bench.read(0x6061) == 1
+    assert await mode_after_rpdo3(bench) == 1
     await bench.master.send(SYNC)
     assert await bench.read(0x6061) == 3
 
@@ -117,9 +120,7 @@ async def test_a_remapped_tpdo_carries_the_new_objects() -> None:
 async def test_a_pdo_is_switched_off_by_bit_31() -> None:
     bench = await Bench.booted()
     await bench.u32(0x1402, 1, 0x80000401)
-    await bench.master.nmt(START, 1)
-    await bench.master.send(RPDO3, "060003")
-    assert await bench.read(0x6061) == 1
+    assert await mode_after_rpdo3(bench) == 1
 
 
 async def test_mapping_is_refused_with_its_reason() -> None:
