@@ -1,0 +1,32 @@
+"""The page of promises: what it says to hold each of them is there, and is run."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = (ROOT / "docs" / "promises.md").read_text("utf-8")
+HELD_BY = re.findall(r"`(test_\w+\.py)::(\w+)`", PAGE)
+
+
+def named_in(name: str) -> set[str]:
+    """Names of the tests of all rooms with that file name."""
+    trees = [ast.parse(path.read_text("utf-8")) for path in (ROOT / "vcan_tests").rglob(name)]
+    return {
+        node.name for tree in trees for node in tree.body if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+    }
+
+
+@pytest.mark.parametrize(("room", "test"), HELD_BY)
+def test_a_promise_is_held_by_a_test_that_exists(room: str, test: str) -> None:
+    assert test in named_in(room)
+
+
+def test_every_promise_names_what_holds_it() -> None:
+    rows = [line for line in PAGE.splitlines() if line.startswith("| ") and not line.startswith(("| ---", "| promise"))]
+    assert rows
+    assert [row for row in rows if "::test_" not in row.rpartition(" | ")[2]] == []
