@@ -10,9 +10,10 @@ from drivers.canopen.codes import ERROR_REGISTER_BITS, NMT_COMMANDS, NMT_STATES,
 from drivers.canopen.objects import BitDef, CodeDef, ObjectDef, ObjectTable, parse_address
 from drivers.encoder.objects import OBJECTS as ENCODER_OBJECTS
 from drivers.encoder.objects import POSITION_ERROR
-from drivers.epos.codes import EMERGENCIES, GATEWAY_ABORTS, VALUE_TABLES
+from drivers.epos.codes import EMERGENCIES, GATEWAY_ABORTS
 from drivers.epos.objects import OBJECTS as EPOS_OBJECTS
 from drivers.epos.state_machine import CONTROLWORD_BITS, STATES, STATUSWORD_BITS, State, command_of, state_of
+from drivers.epos.value_tables import VALUE_TABLES
 
 DICTIONARIES: dict[str, ObjectTable] = {"EPOS 24/5": EPOS_OBJECTS, "CiA 406 encoder": ENCODER_OBJECTS}
 """Object dictionaries by the kind of device."""

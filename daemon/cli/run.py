@@ -122,7 +122,7 @@ def _unknown(bus: str, bit_rate: int | None) -> Profile:
     import msgspec
 
     from daemon.first_contact import bench_profile
-    from drivers.epos.codes import CAN_BIT_RATES
+    from drivers.epos.value_tables import CAN_BIT_RATES
     from profiles.schema import Network
 
     if simulates(bus):

@@ -11,10 +11,10 @@ from daemon.runtime.supervisor import Supervisor
 from drivers.canopen.codes import NmtCommand
 from drivers.canopen.objects import ObjectDef, ObjectTable, parse_address
 from drivers.encoder.objects import OBJECTS as ENCODER_OBJECTS
-from drivers.epos.codes import VALUE_TABLES
 from drivers.epos.commissioning import ABSENT
 from drivers.epos.objects import OBJECTS as EPOS_OBJECTS
 from drivers.epos.state_machine import state_of
+from drivers.epos.value_tables import VALUE_TABLES
 
 NMT_COMMANDS = {
     "start": NmtCommand.START,

@@ -12,11 +12,11 @@ from typing import Any
 
 from canhelm.errors import Refused
 from drivers.canopen.objects import ObjectDef
-from drivers.epos.codes import VALUE_TABLES
 from drivers.epos.configure import HARDWARE_24_5, HARDWARE_MASK, VENDOR_MAXON, emergency_words
 from drivers.epos.objects import OBJECTS
 from drivers.epos.parameters import MOTOR_TYPES, SENSOR_TYPES
 from drivers.epos.state_machine import STATES, state_of
+from drivers.epos.value_tables import VALUE_TABLES
 from profiles.schema import DriveConfig, Motor
 
 Read = Callable[[ObjectDef], Awaitable[int]]

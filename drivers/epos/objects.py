@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from drivers.canopen.objects import Access, DataType, ObjectDef, ObjectTable
+from drivers.epos.communication_objects import COMMUNICATION_AREA, highest_sub_index
 
 _U8, _U16, _U32, _U64 = DataType.U8, DataType.U16, DataType.U32, DataType.U64
 _I8, _I16, _I32 = DataType.I8, DataType.I16, DataType.I32
@@ -19,144 +20,7 @@ _SERVICE_TOOL = "of the data recorder that maxon's service tool uses"
 _FIXED_UNIT = "The unit is fixed: another value is refused."
 
 
-def _count(index: int, name: str, count: int) -> ObjectDef:
-    """Sub-index 0 of a record or array."""
-    return ObjectDef(
-        index, 0, f"{name}_highest_sub_index", _U8, _RO, "Highest sub-index of this object.", default=count
-    )
-
-
 # fmt: off
-def _mapping(index: int, pdo: str, access: Access, count: int, entries: tuple[int, ...]) -> tuple[ObjectDef, ...]:
-    """The mapping record of a PDO: how many objects, and which."""
-    return (
-        ObjectDef(index, 0, f"{pdo}_number_of_mapped_objects", _U8, access,
-                  f"How many objects {pdo.upper()} carries; write 0 before changing its entries, then the count.",
-                  default=count, low=0, high=len(entries),
-                  cause="A count that does not fit the entries: a mapping was changed half.",
-                  cure="In pre-operational write 0, the entries, then the count; read all of them back."),
-        *(ObjectDef(index, place, f"{pdo}_mapping_entry_{place}", _U32, access,
-                    f"Object number {place} in {pdo.upper()}: index, sub-index, length in bits; 0 for none.",
-                    default=entry)
-          for place, entry in enumerate(entries, 1)),
-    )
-
-
-def _communication(index: int, pdo: str, cob_id: int, types: str) -> tuple[ObjectDef, ...]:
-    """The communication record of a PDO: its identifier and when it is sent or applied."""
-    return (
-        _count(index, pdo, 2),
-        ObjectDef(index, 1, f"{pdo}_cob_id", _U32, _RW,
-                  f"Identifier of {pdo.upper()}. The factory value is the one of node 1 on every drive.",
-                  default=cob_id,
-                  cause="A factory value on a node other than 1: it shares its identifiers with other drives.",
-                  cure="Write the identifier with the node's own id, or 'load' to 0x1011/5, save and restart."),
-        ObjectDef(index, 2, f"{pdo}_transmission_type", _U8, _RW, f"When {pdo.upper()} counts: {types}.", default=255),
-    )
-
-
-def _rpdo(number: int, access: Access, count: int, entries: tuple[int, ...]) -> tuple[ObjectDef, ...]:
-    types = "1 applied at the next SYNC, 255 applied at once"
-    return (
-        *_communication(0x13FF + number, f"rpdo{number}", 0x101 + 0x100 * number, types),
-        *_mapping(0x15FF + number, f"rpdo{number}", access, count, entries),
-    )
-
-
-def _tpdo(number: int, access: Access, count: int, entries: tuple[int, ...]) -> tuple[ObjectDef, ...]:
-    types = "1 sent after every SYNC, 255 sent on a remote request only"
-    return (
-        *_communication(0x17FF + number, f"tpdo{number}", 0x81 + 0x100 * number, types),
-        _inhibit_time(number),
-        *_mapping(0x19FF + number, f"tpdo{number}", access, count, entries),
-    )
-
-
-def _inhibit_time(number: int) -> ObjectDef:
-    return ObjectDef(0x17FF + number, 3, f"tpdo{number}_inhibit_time", _U16, _RW,
-                     f"Shortest time between two frames of TPDO{number}.", unit="100 us", firmware="later")
-
-
-_COMMUNICATION_AREA = (
-    ObjectDef(0x1000, 0, "device_type", _U32, _CONST,
-              "What kind of device this is: low word 0x0192 for the drive profile CiA 402.", default=0x200192,
-              cause="Another value: the node is no EPOS.", cure="Check node ids of encoders and drives."),
-    ObjectDef(0x1001, 0, "error_register", _U8, _RO, "Kinds of errors that are present, one bit each.", default=0,
-              cause="Any bit set: the drive has a fault.", cure="Read the error history (0x1003), cure it, reset it."),
-    ObjectDef(0x1003, 0, "number_of_recorded_errors", _U8, _RW,
-              "Entries in the error history; writing 0 clears it, other values are refused.",
-              default=0, low=0, high=5),
-    *(ObjectDef(0x1003, entry, f"error_history_entry_{entry}", _U32, _RO,
-                f"Error history, entry {entry} of 5, the newest first: an EMCY code in the low word.",
-                default=0, unit="emcy code",
-                cause="Not 0: an error came up since the history was cleared.",
-                cure="Look the code up (canhelm explain CODE --as emcy), then write 0 to 0x1003.")
-      for entry in range(1, 6)),
-    ObjectDef(0x1005, 0, "cob_id_sync", _U32, _RW,
-              "Identifier of SYNC. The drive only consumes SYNC; the manual calls the object read-only.", default=0x80),
-    ObjectDef(0x1008, 0, "device_name", DataType.VISIBLE_STRING, _CONST, "Name of the device.", default="EPOS"),
-    ObjectDef(0x100C, 0, "guard_time", _U16, _RW, "Time between two guard requests of the master; 0 is off.",
-              default=0, unit="ms",
-              cause="0: the drive does not notice the loss of its master.", cure="Set it before enabling the drive."),
-    ObjectDef(0x100D, 0, "life_time_factor", _U8, _RW,
-              "Guard times without a request after which the drive stops with EMCY 0x8130; 0 is off. "
-              "Counting starts with the first request.", default=0,
-              cause="0: the drive does not notice the loss of its master.", cure="Set it before enabling the drive."),
-    _count(0x1010, "store", 1),
-    ObjectDef(0x1010, 1, "save_all_parameters", _U32, _RW,
-              "Writing 0x65766173 ('save') keeps all parameters in non-volatile memory."),
-    _count(0x1011, "restore", 5),
-    ObjectDef(0x1011, 1, "restore_all_defaults", _U32, _RW,
-              "Writing 0x64616F6C ('load') brings the factory values back at the next start."),
-    ObjectDef(0x1011, 5, "recompute_pdo_cob_ids_from_node_id", _U32, _RW,
-              "Writing 0x64616F6C ('load') sets all PDO identifiers by the node id; then save and restart."),
-    ObjectDef(0x1014, 0, "cob_id_emcy", _U32, _RO, "Identifier of the emergency message.",
-              default=0x80, plus_node_id=True),
-    ObjectDef(0x1016, 1, "consumer_heartbeat_1", _U32, _RW,
-              "Node whose heartbeat is watched, and how long it may be silent.",
-              default=0, unit="node<<16 + ms", firmware="later"),
-    ObjectDef(0x1017, 0, "producer_heartbeat_time", _U16, _RW, "Period of the drive's own heartbeat; 0 is off.",
-              default=0, unit="ms", firmware="later"),
-    _count(0x1018, "identity", 2),
-    ObjectDef(0x1018, 1, "vendor_id", _U32, _RO, "Who made it: 251 is maxon motor.", default=251,
-              cause="Another value: this is no maxon drive.", cure="Check node ids; correct the profile."),
-    ObjectDef(0x1018, 2, "product_code", _U32, _RO, "Hardware version in the high word, software version in the low."),
-    ObjectDef(0x1018, 3, "revision_number", _U32, _RO, "Revision of the device.", firmware="later"),
-    ObjectDef(0x1018, 4, "identity_serial_number", _U32, _RO, "Serial number, 32 bits of it.", firmware="later"),
-    ObjectDef(0x1020, 1, "verify_configuration_date", _U32, _RW, "Date stamp of the configuration, for comparison.",
-              default=0, firmware="later"),
-    ObjectDef(0x1020, 2, "verify_configuration_time", _U32, _RW, "Time stamp of the configuration, for comparison.",
-              default=0, firmware="later"),
-    _count(0x1200, "sdo_server", 2),
-    ObjectDef(0x1200, 1, "cob_id_sdo_client_to_server", _U32, _RO, "Identifier of SDO requests to the drive.",
-              default=0x600, plus_node_id=True),
-    ObjectDef(0x1200, 2, "cob_id_sdo_server_to_client", _U32, _RO, "Identifier of the drive's SDO answers.",
-              default=0x580, plus_node_id=True),
-    *_rpdo(1, _RW, 1, (0x206B_0020, 0, 0, 0)),
-    *_rpdo(2, _RW, 1, (0x6040_0010, 0x60FF_0020, 0, 0)),
-    *_rpdo(3, _RO, 2, (0x6040_0010, 0x6060_0008)),
-    ObjectDef(0x1403, 1, "rpdo4_cob_id", _U32, _RW, "Identifier of RPDO4; bit 31 set: not used.",
-              default=0x501, firmware="later"),
-    ObjectDef(0x1403, 2, "rpdo4_transmission_type", _U8, _RW, "When RPDO4 is applied: 1 at the next SYNC, 255 at once.",
-              default=255, firmware="later"),
-    ObjectDef(0x1603, 1, "rpdo4_mapping_entry_1", _U32, _RW, "First object in RPDO4.",
-              default=0x6040_0010, firmware="later"),
-    ObjectDef(0x1603, 2, "rpdo4_mapping_entry_2", _U32, _RW, "Second object in RPDO4.",
-              default=0x60FF_0020, firmware="later"),
-    *_tpdo(1, _RW, 2, (0x606C_0020, 0x6064_0020, 0, 0)),
-    *_tpdo(2, _RW, 2, (0x6078_0010, 0x207C_0110, 0x207C_0210, 0)),
-    *_tpdo(3, _RO, 2, (0x6041_0010, 0x6061_0008)),
-    ObjectDef(0x1803, 1, "tpdo4_cob_id", _U32, _RW, "Identifier of TPDO4; bit 31 set: not used.",
-              default=0x481, firmware="later"),
-    ObjectDef(0x1803, 2, "tpdo4_transmission_type", _U8, _RW, "When TPDO4 is sent: 1 after every SYNC, 255 on change.",
-              default=255, firmware="later"),
-    _inhibit_time(4),
-    ObjectDef(0x1A03, 1, "tpdo4_mapping_entry_1", _U32, _RW, "First object in TPDO4.",
-              default=0x6041_0010, firmware="later"),
-    ObjectDef(0x1A03, 2, "tpdo4_mapping_entry_2", _U32, _RW, "Second object in TPDO4.",
-              default=0x606C_0020, firmware="later"),
-)
-
 _SYSTEM = (
     ObjectDef(0x2000, 0, "node_id_software", _U8, _RW,
               f"Node id that counts while all DIP switches of the id are off. {_RESTART}", default=1, low=1, high=127),
@@ -164,7 +28,7 @@ _SYSTEM = (
               default=0, unit="code", low=0, high=6),
     ObjectDef(0x2002, 0, "rs232_baud_rate_code", _U16, _RW, f"Baud rate of the serial line, 3 for 38400. {_RESTART}",
               default=3, unit="code", low=0, high=5),
-    _count(0x2003, "version", 5),
+    highest_sub_index(0x2003, "version", 5),
     ObjectDef(0x2003, 1, "software_version", _U16, _RO, "Firmware version, read as hexadecimal digits: 0x2011.",
               unit="bcd-like hex",
               cause="Above 0x2011: later firmware with other objects and PDO rules.",
@@ -195,10 +59,10 @@ _RECORDER = (
     ObjectDef(0x2012, 0, "recorder_sampling_period", _U16, _RW, f"Sampling period {_SERVICE_TOOL}."),
     ObjectDef(0x2013, 0, "recorder_preceding_samples", _U16, _RW, f"Samples before the trigger {_SERVICE_TOOL}."),
     ObjectDef(0x2014, 0, "recorder_number_of_variables", _U16, _RW, f"Number of variables {_SERVICE_TOOL}."),
-    _count(0x2015, "recorder_variable_index", 4),
+    highest_sub_index(0x2015, "recorder_variable_index", 4),
     *(ObjectDef(0x2015, place, f"recorder_variable_{place}_index", _U16, _RW,
                 f"Index of variable {place} {_SERVICE_TOOL}.") for place in range(1, 5)),
-    _count(0x2016, "recorder_variable_subindex", 4),
+    highest_sub_index(0x2016, "recorder_variable_subindex", 4),
     *(ObjectDef(0x2016, place, f"recorder_variable_{place}_subindex", _U16, _RW,
                 f"Sub-index of variable {place} {_SERVICE_TOOL}.") for place in range(1, 5)),
     ObjectDef(0x2017, 0, "recorder_status", _U16, _RO, f"State {_SERVICE_TOOL}."),
@@ -222,7 +86,7 @@ _SENSORS = (
               cause="Bit 7: the motor drew more than its continuous current for too long.",
               cure="Lower load or acceleration; check that no brake drags."),
     ObjectDef(0x2025, 0, "reserved", _U32, _WO, "Reserved by the maker; do not write."),
-    _count(0x2026, "process_memory", 2),
+    highest_sub_index(0x2026, "process_memory", 2),
     ObjectDef(0x2026, 1, "process_memory_address", _U16, _RW, "Address for the maker's diagnosis; do not write."),
     ObjectDef(0x2026, 2, "process_memory_value", _U16, _RW, "Value at that address, for the maker's diagnosis."),
     ObjectDef(0x2027, 0, "current_actual_value_averaged", _I16, _RO, "Motor current, smoothed.", unit="mA"),
@@ -240,12 +104,12 @@ _SET_VALUES_AND_PINS = (
               default=0, unit="qc", pdo="rx"),
     ObjectDef(0x206B, 0, "velocity_mode_setting_value", _I32, _RW,
               "Set value of velocity mode (-2); acts at once without a profile.", unit="rpm", pdo="rx"),
-    _count(0x2070, "digital_input_function", 6),
+    highest_sub_index(0x2070, "digital_input_function", 6),
     *(ObjectDef(0x2070, pin, f"function_of_digital_input_{pin}", _U16, _RW,
                 f"What digital input {pin} is for: the number of its bit in 0x2071.",
                 default=function, unit="code", low=0, high=15)
       for pin, function in enumerate((15, 14, 13, 2, 1, 0), 1)),
-    _count(0x2071, "digital_input_functions", 4),
+    highest_sub_index(0x2071, "digital_input_functions", 4),
     ObjectDef(0x2071, 1, "digital_input_functions_state", _U16, _RO,
               "Input functions that are active, after mask and polarity.", pdo="tx"),
     ObjectDef(0x2071, 2, "digital_input_functions_mask", _U16, _RW, "Input functions that are looked at.",
@@ -256,7 +120,7 @@ _SET_VALUES_AND_PINS = (
               "Functions that the drive acts on (limit switches, marker, enable), not only shows.", default=8,
               cause="A limit switch's bit is 0: the switch is seen and not obeyed.",
               cure="Set bits 0 and 1 where limit switches are wired."),
-    _count(0x2074, "position_marker", 2),
+    highest_sub_index(0x2074, "position_marker", 2),
     ObjectDef(0x2074, 1, "captured_position", _I32, _RO, "Position at the last edge of the marker input.", unit="qc"),
     ObjectDef(0x2074, 2, "capture_edge", _U8, _RW, "Edge that captures: 0 both, 1 rising, 2 falling.",
               default=0, unit="code", low=0, high=2),
@@ -265,7 +129,7 @@ _SET_VALUES_AND_PINS = (
     ObjectDef(0x2074, 4, "position_marker_capture_counter", _U16, _RW, "Edges captured so far.", firmware="later"),
     *(ObjectDef(0x2074, 4 + age, f"position_marker_capture_history_{age}", _I32, _RO,
                 f"Position captured {age} before the last.", unit="qc", firmware="later") for age in (1, 2)),
-    _count(0x2078, "digital_output_functions", 3),
+    highest_sub_index(0x2078, "digital_output_functions", 3),
     ObjectDef(0x2078, 1, "digital_output_functions_state", _U16, _RW,
               "Wanted output functions: bits 15 to 12 for general purpose A to D, bit 0 ready. "
               "At polarity 0 a 0 lets the open-drain output sink.", pdo="rx",
@@ -277,12 +141,12 @@ _SET_VALUES_AND_PINS = (
               cure="Write state 0x2078/1 first, then set the bit."),
     ObjectDef(0x2078, 3, "digital_output_functions_polarity", _U16, _RW, "Bit 1: the output function is inverted.",
               default=0),
-    _count(0x2079, "digital_output_function", 4),
+    highest_sub_index(0x2079, "digital_output_function", 4),
     *(ObjectDef(0x2079, pin, f"function_of_digital_output_{pin}", _U16, _RW,
                 f"What digital output {pin} shows: the number of its bit in 0x2078.",
                 default=16 - pin, unit="code", low=0, high=15)
       for pin in range(1, 5)),
-    _count(0x207C, "analog_input", 2),
+    highest_sub_index(0x207C, "analog_input", 2),
     ObjectDef(0x207C, 1, "analog_input_1", _I16, _RO, "Voltage at analog input 1.", unit="mV", pdo="tx"),
     ObjectDef(0x207C, 2, "analog_input_2", _I16, _RO, "Voltage at analog input 2.", unit="mV", pdo="tx"),
     ObjectDef(0x2080, 0, "current_threshold_for_homing", _U16, _RW,
@@ -293,7 +157,7 @@ _SET_VALUES_AND_PINS = (
     ObjectDef(0x20F4, 0, "following_error_actual_value", _I16, _RO, "Demanded minus actual position.",
               unit="qc", pdo="tx", firmware="later",
               cause="Near 0x6065: the axis cannot follow.", cure="Lower the ramps, free the axis, tune the regulator."),
-    _count(0x2210, "sensor_configuration", 3),
+    highest_sub_index(0x2210, "sensor_configuration", 3),
     ObjectDef(0x2210, 1, "encoder_pulses_per_turn", _U16, _RW,
               "Pulses of the motor encoder a turn; a turn has four times as many qc. A change raises EMCY 0x7320.",
               default=500, unit="pulses/turn", low=16, high=7500,
@@ -305,7 +169,7 @@ _SET_VALUES_AND_PINS = (
     ObjectDef(0x2210, 3, "absolute_position_offset", _U16, _RW, "Offset of an absolute sensor, inside the drive."),
     ObjectDef(0x2210, 4, "position_sensor_polarity", _U16, _RW, "Direction of encoder and hall sensors, one bit each.",
               firmware="later"),
-    _count(0x2300, "digital_position", 4),
+    highest_sub_index(0x2300, "digital_position", 4),
     ObjectDef(0x2300, 1, "digital_position_desired_value", _I32, _RO,
               "Steps counted in the modes master encoder (-5) and step/direction (-6).", default=0, unit="steps"),
     ObjectDef(0x2300, 2, "digital_position_scaling_numerator", _U16, _RW, "Position a step, numerator.", default=1),
@@ -352,7 +216,7 @@ _DRIVE_PROFILE = (
               "Target of profile position mode; taken at the next rising edge of controlword bit 4.",
               default=0, unit="qc", pdo="rx"),
     ObjectDef(0x607C, 0, "home_offset", _I32, _RW, "Way to go on after the reference was found.", default=0, unit="qc"),
-    _count(0x607D, "position_limit", 2),
+    highest_sub_index(0x607D, "position_limit", 2),
     ObjectDef(0x607D, 1, "min_position_limit", _I32, _RW, "Lowest position allowed; below it EMCY 0xFF09.",
               default=-0x8000_0000, unit="qc"),
     ObjectDef(0x607D, 2, "max_position_limit", _I32, _RW, "Highest position allowed; above it EMCY 0xFF09.",
@@ -387,24 +251,24 @@ _DRIVE_PROFILE = (
     ObjectDef(0x6098, 0, "homing_method", _I8, _RW,
               "How home is found: 35 takes the present position, 33 and 34 the index, below 0 a stop by its current.",
               default=7, unit="code", low=-4, high=35),
-    _count(0x6099, "homing_speed", 2),
+    highest_sub_index(0x6099, "homing_speed", 2),
     ObjectDef(0x6099, 1, "homing_speed_switch_search", _U32, _RW, "Speed while looking for the switch or stop.",
               default=100, unit="rpm"),
     ObjectDef(0x6099, 2, "homing_speed_zero_search", _U32, _RW, "Speed while looking for the edge or index.",
               default=10, unit="rpm"),
     ObjectDef(0x609A, 0, "homing_acceleration", _U32, _RW, "Ramp of homing, up and down, and of halt in it.",
               default=1000, unit="rpm/s"),
-    _count(0x60F6, "current_regulator", 2),
+    highest_sub_index(0x60F6, "current_regulator", 2),
     ObjectDef(0x60F6, 1, "current_regulator_p_gain", _I16, _RW, "Proportional gain of the current regulator.",
               low=0, high=32767),
     ObjectDef(0x60F6, 2, "current_regulator_i_gain", _I16, _RW, "Integral gain of the current regulator.",
               low=0, high=32767),
-    _count(0x60F9, "velocity_regulator", 2),
+    highest_sub_index(0x60F9, "velocity_regulator", 2),
     ObjectDef(0x60F9, 1, "velocity_regulator_p_gain", _I16, _RW, "Proportional gain of the velocity regulator.",
               low=0, high=32767),
     ObjectDef(0x60F9, 2, "velocity_regulator_i_gain", _I16, _RW, "Integral gain of the velocity regulator.",
               low=0, high=32767),
-    _count(0x60FB, "position_regulator", 3),
+    highest_sub_index(0x60FB, "position_regulator", 3),
     ObjectDef(0x60FB, 1, "position_regulator_p_gain", _I16, _RW, "Proportional gain of the position regulator.",
               low=0, high=32767),
     ObjectDef(0x60FB, 2, "position_regulator_i_gain", _I16, _RW, "Integral gain of the position regulator.",
@@ -423,7 +287,7 @@ _DRIVE_PROFILE = (
               f"1 brushed DC, 10 brushless with sine, 11 with block commutation. {_RESTART}", default=10, unit="code",
               cause="Not the motor's kind: it does not turn, or draws too much current.",
               cure="Set it to the motor's kind, save, restart."),
-    _count(0x6410, "motor_data", 5),
+    highest_sub_index(0x6410, "motor_data", 5),
     ObjectDef(0x6410, 1, "continuous_current_limit", _U16, _RW, "Current that the motor may draw for ever.",
               unit="mA", low=0, high=5000,
               cause="Above the motor's nominal current: its winding may burn.", cure="Set it from the motor's data."),
@@ -465,7 +329,7 @@ def _source(entry: ObjectDef) -> str:
     return "maxon EPOS Firmware Specification 14.1"
 
 
-_ENTRIES = _COMMUNICATION_AREA + _SYSTEM + _RECORDER + _SENSORS + _SET_VALUES_AND_PINS + _DRIVE_PROFILE
+_ENTRIES = COMMUNICATION_AREA + _SYSTEM + _RECORDER + _SENSORS + _SET_VALUES_AND_PINS + _DRIVE_PROFILE
 
 OBJECTS = ObjectTable(
     tuple(

@@ -11,9 +11,9 @@ from drivers.canopen.dcf import DeviceKind
 from drivers.canopen.objects import Access, ObjectDef
 from drivers.canopen.pdo import AT_ONCE, ON_SYNC, Settings, rpdo_settings, tpdo_settings
 from drivers.epos.codec import DRIVING_MODES, RPDO1_MAPS, TPDO1_MAP, TPDO2_MAP
-from drivers.epos.codes import CAN_BIT_RATES
 from drivers.epos.objects import OBJECTS
 from drivers.epos.units import WheelUnits
+from drivers.epos.value_tables import CAN_BIT_RATES
 from profiles.schema import DriveConfig, Network
 
 EPOS_24_5 = DeviceKind(

@@ -13,9 +13,10 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from drivers.epos.codes import EMERGENCIES, HOMING_METHODS, MOTOR_TYPES
+from drivers.epos.codes import EMERGENCIES
 from drivers.epos.objects import OBJECTS
 from drivers.epos.state_machine import Mode, State
+from drivers.epos.value_tables import HOMING_METHODS, MOTOR_TYPES
 from drivers.simulated.bus import SimulatedPort
 from drivers.simulated.dictionary import LOAD, OUT_OF_RANGE, READ_ONLY, SdoAbort, SimulatedDictionary, Value
 from drivers.simulated.epos_homing import Homing

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from enum import Enum, auto
 
 from drivers.canopen.codes import NmtState
-from drivers.epos.codes import RS232_BAUD_RATES
 from drivers.epos.serial_frames import FAILED, OKAY, Opcode, frame_size, parse_frame
+from drivers.epos.value_tables import RS232_BAUD_RATES
 from drivers.simulated.node import SimulatedNode
 from drivers.simulated.serial_commands import SerialCommands
 from drivers.simulated.serial_wire import QUIET, SerialCable, SerialNoise

@@ -12,8 +12,9 @@ from drivers.canopen.codes import (
     NmtState,
     emcy_class,
 )
-from drivers.epos.codes import EMERGENCIES, GATEWAY_ABORTS, VALUE_TABLES
+from drivers.epos.codes import EMERGENCIES, GATEWAY_ABORTS
 from drivers.epos.objects import OBJECTS
+from drivers.epos.value_tables import VALUE_TABLES
 
 TROUBLE = [*SDO_ABORTS.values(), *GATEWAY_ABORTS.values(), *EMERGENCIES.values()]
 EMERGENCIES_2011H = [code for code in EMERGENCIES.values() if code.code and code.register is not None]
