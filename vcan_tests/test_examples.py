@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import re
-import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -39,10 +38,7 @@ def daemon(folder: Path, profile_text: str = PATIENT_PROFILE) -> Iterator[Bench]
     try:
         yield bench
     finally:
-        bench.client.close()
-        bench.process.send_signal(signal.SIGTERM)
-        assert bench.process.wait(TIMEOUT_S) == 0
-        assert "Traceback" not in bench.log.read_text()
+        bench.end()
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import subprocess
 import sys
 import sysconfig
@@ -59,9 +58,7 @@ def robot(tmp_path: Path) -> Iterator[Bench]:
     """A running daemon with a simulated robot."""
     bench = Bench(tmp_path)
     yield bench
-    bench.client.close()
-    bench.process.send_signal(signal.SIGTERM)
-    assert bench.process.wait(TIMEOUT_S) == 0
+    bench.end()
 
 
 def test_it_holds_the_client_and_nothing_else_of_canhelm(wheel: Path) -> None:

@@ -301,9 +301,7 @@ def test_a_person_calibrates_a_simulated_sensor_at_a_terminal(tmp_path: Path) ->
         told = json.loads(person.process.communicate(timeout=60)[0])
         assert person.process.returncode == 0
     finally:
-        bench.client.close()
-        bench.process.kill()
-        bench.process.wait()
+        bench.kill()
     assert told["hysteresis_deg"] == pytest.approx(0.8, abs=0.15)
     assert (tmp_path / "front.csv").is_file()
     calibration = load(profile).profile.encoders["front"].calibration

@@ -14,7 +14,7 @@ from canhelm.errors import DaemonNotRunning
 from daemon.cli.main import main
 from daemon.cli.options import Options
 from profiles.path_file import load_path_file
-from vcan_tests.daemon.test_processes import TIMEOUT_S, Bench
+from vcan_tests.daemon.test_processes import Bench
 
 PATIENT_SEMITRAILER = """
 schema_version: 1
@@ -28,9 +28,7 @@ network: {guard_time_ms: 1000, life_time_factor: 4}
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     bench = Bench(tmp_path_factory.mktemp("semitrailer"), profile_text=PATIENT_SEMITRAILER)
     yield bench
-    bench.client.close()
-    bench.process.send_signal(signal.SIGTERM)
-    assert bench.process.wait(TIMEOUT_S) == 0
+    bench.end()
 
 
 def printed(output: str) -> dict[str, Any]:

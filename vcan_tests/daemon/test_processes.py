@@ -99,6 +99,19 @@ class Bench:
             assert time.monotonic() < deadline, status
         return status
 
+    def end(self) -> None:
+        """End the daemon as a service manager does; it goes down in order."""
+        self.client.close()
+        self.process.send_signal(signal.SIGTERM)
+        assert self.process.wait(TIMEOUT_S) == 0
+        assert "Traceback" not in self.log.read_text()
+
+    def kill(self) -> None:
+        """End the daemon at once, whether it still runs or not."""
+        self.client.close()
+        self.process.kill()
+        self.process.wait()
+
 
 def speeds(status: dict[str, Any]) -> list[float]:
     return [abs(node["speed_m_s"]) for node in status["nodes"] if "speed_m_s" in node]
@@ -144,19 +157,14 @@ def test_the_same_commands_end_alike_over_can_and_over_a_serial_line(bus: str, t
         assert status["vehicle"]["heading_deg"]["front"] == pytest.approx(0.0, abs=1.0)
         assert status["vehicle"]["heading_deg"]["rear"] == pytest.approx(-15.0, abs=1.0)
     finally:
-        bench.client.close()
-        bench.process.send_signal(signal.SIGTERM)
-        assert bench.process.wait(TIMEOUT_S) == 0
+        bench.end()
 
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     bench = Bench(tmp_path_factory.mktemp("bench"))
     yield bench
-    bench.client.close()
-    bench.process.send_signal(signal.SIGTERM)
-    assert bench.process.wait(TIMEOUT_S) == 0
-    assert "Traceback" not in bench.log.read_text()
+    bench.end()
     assert not bench.socket.exists()
 
 

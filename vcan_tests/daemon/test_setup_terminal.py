@@ -30,9 +30,7 @@ def miswired(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]
     bench = Bench(tmp_path, profile_text=f"{PATIENT_PROFILE}setup: needed\n")
     bench.client.call("simulation.lift", lifted=True)
     yield bench
-    bench.client.close()
-    bench.process.kill()
-    bench.process.wait()
+    bench.kill()
 
 
 def eyes_on(bench: Bench) -> WorkshopPerson:
@@ -59,14 +57,20 @@ def test_a_reversed_wheel_is_found_and_written(miswired: Bench, tmp_path: Path) 
     assert load(tmp_path / "max2d.yaml").profile.drives["rear_left"].direction == -1
 
 
-def jogged(bench: Bench) -> Person:
-    """A setup whose first wheel turns, with its limits lowered."""
+def begun(bench: Bench) -> Person:
+    """A setup that is about to turn its first wheel, with its limits lowered."""
     person = Person(bench, ["setup", "rear_left"])
     for _ in range(2):
         person.reads_until(" [y/n] ")
         person.types("y")
     person.reads_until("Enter and watch ")
     assert limit_ma(bench) == 500
+    return person
+
+
+def jogged(bench: Bench) -> Person:
+    """A setup whose first wheel turns."""
+    person = begun(bench)
     person.types("")
     bench.wait_for(lambda status: status["state"] == "active")
     return person
@@ -111,11 +115,7 @@ def test_a_daemon_that_is_killed_meanwhile_is_told_with_what_to_do(miswired: Ben
 
 @pytest.mark.real_time
 def test_meanwhile_others_may_only_look_and_stop(miswired: Bench) -> None:
-    person = Person(miswired, ["setup", "rear_left"])
-    for _ in range(2):
-        person.reads_until(" [y/n] ")
-        person.types("y")
-    person.reads_until("Enter and watch ")
+    person = begun(miswired)
     for command in ("motor velocity front_left 100 --duration 1", "motor enable front_left", "brake release front"):
         refused = miswired.canhelm(*command.split())
         assert (command, refused.returncode) == (command, 6)

@@ -42,9 +42,7 @@ def device(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def bench(tmp_path: Path) -> Iterator[Bench]:
     made = Bench(tmp_path)
     yield made
-    made.client.close()
-    made.process.kill()
-    made.process.wait()
+    made.kill()
 
 
 class Person:
@@ -94,6 +92,15 @@ class Person:
         assert not self.wrong, self.wrong
 
 
+def drive(bench: Bench, device: Path, acts: Callable[[Person], None]) -> int:
+    """The command until somebody ends it, in the hands of a person who acts; its exit code."""
+    person = Person(device, acts)
+    try:
+        return main(["drive", "joystick", "--socket", str(bench.socket)])
+    finally:
+        person.ends()
+
+
 @pytest.mark.real_time
 @pytest.mark.timeout(60)
 def test_a_pad_drives_is_unplugged_comes_back_and_drives_again(
@@ -108,12 +115,7 @@ def test_a_pad_drives_is_unplugged_comes_back_and_drives_again(
             bench.wait_for(at_rest)
             person.plug_in()
 
-    person = Person(device, acts)
-    try:
-        code = main(["drive", "joystick", "--socket", str(bench.socket)])
-    finally:
-        person.ends()
-    assert code == 130
+    assert drive(bench, device, acts) == 130
     told = capsys.readouterr().err
     assert told.count(f"{NAME} has gone (it says no more): the robot is at rest") == 2
     assert f"waiting for {NAME}" in told
@@ -129,12 +131,7 @@ def test_a_daemon_that_dies_on_the_way_ends_it(bench: Bench, device: Path, capsy
         bench.process.kill()
         person.over.wait(30.0)
 
-    person = Person(device, acts)
-    try:
-        code = main(["drive", "joystick", "--socket", str(bench.socket)])
-    finally:
-        person.ends()
-    assert code == 3
+    assert drive(bench, device, acts) == 3
     told = capsys.readouterr().err.splitlines()
     assert told[-1].startswith("canhelm: the daemon hung up")
     assert all(line.startswith("canhelm: ") for line in told)
