@@ -5,6 +5,7 @@ Pure functions for both ends. ``parse_message`` never raises on what a stranger 
 
 from __future__ import annotations
 
+import grp
 import json
 import math
 import os
@@ -33,6 +34,8 @@ INTERNAL_ERROR = -32603
 SYSTEM_FOLDER = Path("/run/canhelm")
 GATEWAY_SUFFIX = ".309.sock"
 """Ending of the sockets beside them that speak CiA 309-3."""
+DRIVERS = "canhelm"
+"""The group whose members drive, where a daemon was not told another one."""
 _ROBOT_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,63}")
 
 
@@ -260,5 +263,14 @@ def _how_to_start(path: Path) -> str:
 def _refused(path: str | os.PathLike[str]) -> PermissionRefused:
     return PermissionRefused(
         f"this user may not open {os.fspath(path)}",
-        remedy="join the group: sudo usermod -aG canhelm $USER, then log in again",
+        remedy=f"join the group: sudo usermod -aG {_group_of(path)} $USER, then log in again",
     )
+
+
+def _group_of(path: str | os.PathLike[str]) -> str:
+    """The group that may open a socket; canhelm's own where that is not to be seen, or root's."""
+    try:
+        number = os.stat(path).st_gid
+        return grp.getgrgid(number).gr_name if number else DRIVERS
+    except (OSError, KeyError):
+        return DRIVERS

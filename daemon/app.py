@@ -33,6 +33,7 @@ from profiles.schema import Profile
 
 if TYPE_CHECKING:
     from daemon.api.gateway309 import Gateway309
+    from daemon.api.peers import Rights
     from daemon.api.server import Server
 
 LOGGER = logging.getLogger("canhelm")
@@ -72,6 +73,7 @@ class App:
         runs: where each motion leaves a run; None for nowhere.
         inherited: sockets that listen already, by their paths; the service manager has opened them and takes them away.
         faults: that strike the simulated network; counted from its start.
+        groups: names of those whose members may watch, drive and configure; None: the usual ones.
     """
 
     def __init__(
@@ -90,6 +92,7 @@ class App:
         profile_file: Path | None = None,
         runs: RunStore | None = None,
         faults: Sequence[PlacedFault] = (),
+        groups: tuple[str, str, str] | None = None,
     ) -> None:
         self.spec = bus
         self.wire = wire = make_wire(bus, profile, seed, built)
@@ -118,6 +121,7 @@ class App:
         self.service = Service(profile.name, self.supervisor, commands, self.bus, self.cycle, profile_file)
         self.service.runs = RunRecorder(runs, self.supervisor, self.bus, profile, bus) if runs else None
         self._localise(commands)
+        self._groups = groups
         self.server = self._serve(socket) if socket else None
         self.gateway = self._serve_tools(gateway) if gateway else None
 
@@ -141,10 +145,15 @@ class App:
         if self.network is not None and self.network.scanner is not None:
             self.network.scanner.on_scan = localiser.take
 
+    def _rights(self) -> Rights:
+        from daemon.api.peers import Groups, Rights
+
+        return Rights(Groups(*self._groups) if self._groups else None)
+
     def _serve(self, socket: Path) -> Server:
         from daemon.api.server import Server
 
-        return Server(self.service, socket, self._inherited.get(socket))
+        return Server(self.service, socket, self._inherited.get(socket), self._rights())
 
     def _serve_tools(self, access: GatewayAccess) -> Gateway309:
         from daemon.api.gateway309 import Gateway309
@@ -155,6 +164,7 @@ class App:
             tcp_port=access.tcp_port,
             writable=access.writable,
             inherited=self._inherited.get(access.path),
+            rights=self._rights(),
         )
 
     async def start(self) -> None:

@@ -72,6 +72,7 @@ class Connection(asyncio.Protocol):
             "unsubscribe": self._unsubscribe,
             "lease.renew": self._renew,
             "lease.close": self._close_lease,
+            "lease.take": self._take_lease,
         }
 
     # -- the wire -----------------------------------------------------------------------------------------------------
@@ -80,7 +81,7 @@ class Connection(asyncio.Protocol):
         """A client is there."""
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
-        self._peer = Peer.of(transport.get_extra_info("socket"))
+        self._peer = self._server.rights.peer(transport.get_extra_info("socket"))
         self._name = f"client {self._name.split()[-1]} (pid {self._peer.pid})"
         self._server.admit(self)
 
@@ -210,7 +211,9 @@ class Connection(asyncio.Protocol):
         method = METHODS.get(name)
         if method is None:
             raise UsageError(f"no method {name[:80]!r}", remedy="api.schema lists the methods")
-        self._peer.require(method)
+        refusal = self._server.rights.refusal(self._peer, method.role, method.name)
+        if refusal is not None:
+            raise refusal
         if self.crowded and not method.urgent and name != "hello":
             raise Refused("too many clients: this one may only stop", remedy="close other clients, and connect again")
         if len(self._pending) >= MAX_PENDING * (1 + method.urgent):
@@ -239,8 +242,7 @@ class Connection(asyncio.Protocol):
         own = self._own.get(method.name)
         if own is not None:
             return await own(params)
-        handed_over = params.get("wait") is False
-        lease = self._held_lease() if method.needs_lease and not handed_over else self._lease_beside(method)
+        lease = self._held_lease() if method.needs_lease else self._lease
         return await self._server.backend.call(method.name, params, lease)
 
     def _answer(self, request_id: int | str | None, code: int, error: CanhelmError) -> None:
@@ -259,17 +261,17 @@ class Connection(asyncio.Protocol):
             except Refused:
                 self._lease = None
         if self._lease is None:
-            self._lease = backend.open_lease(self._name)
+            who = self._peer.details()
+            self._lease = backend.open_lease("{user} (pid {pid}: {command})".format(**who), who)
         return self._lease
-
-    def _lease_beside(self, method: Method) -> str | None:
-        """The lease that this connection happens to have, for what needs none but may belong to its setup."""
-        return None if method.needs_lease else self._lease
 
     async def _renew(self, params: dict[str, Any]) -> dict[str, Any]:
         if self._lease is not None:
             self._server.backend.renew_lease(self._lease)
         return {"lease": self._lease}
+
+    async def _take_lease(self, params: dict[str, Any]) -> dict[str, Any]:
+        return {"taken_from": await self._server.backend.take_lease(self._held_lease())}
 
     async def _close_lease(self, params: dict[str, Any]) -> dict[str, Any]:
         if self._lease is not None:
@@ -305,7 +307,10 @@ class Connection(asyncio.Protocol):
         }
 
     async def _status(self, params: dict[str, Any]) -> dict[str, Any]:
-        return self._server.status()
+        return self._seen()
+
+    def _seen(self) -> dict[str, Any]:
+        return {**self._server.status(), "role": self._peer.role}
 
     async def _subscribe(self, params: dict[str, Any]) -> dict[str, Any]:
         self._stop_sampling()
@@ -328,8 +333,7 @@ class Connection(asyncio.Protocol):
         self._sampling = asyncio.get_running_loop().call_later(self._period_s, self._sample)
         if self._reads_too_slowly():
             return
-        sample = {**self._server.status(), "lost_samples": self._lost}
-        self._send(protocol.make_notification("status", sample))
+        self._send(protocol.make_notification("status", {**self._seen(), "lost_samples": self._lost}))
 
     def publish(self, line: bytes) -> None:
         """Send a notification, unless the client reads too slowly."""

@@ -17,9 +17,9 @@ from canhelm.errors import ConfigError
 from daemon.api.gateway309_answers import ErrorNumber, make_error
 from daemon.api.gateway309_session import Session
 from daemon.api.gateway309_text import MAX_LINE_BYTES
+from daemon.api.listeners import open_listener, remove_socket
 from daemon.api.parameters import Role
-from daemon.api.peers import ADMINS, USERS, Peer
-from daemon.api.server import open_listener, remove_socket
+from daemon.api.peers import Rights
 from daemon.runtime.supervisor import Supervisor
 
 LOGGER = logging.getLogger("canhelm.gateway")
@@ -29,7 +29,6 @@ STALLED_S = 10.0
 """How long a client may leave its answers unread."""
 _CLOSED = "this gateway only reads: start the daemon with --gateway-write"
 _TCP_READS = "over TCP the gateway only reads: use its Unix socket"
-_NO_ADMIN = f"this user may only read: sudo usermod -aG {ADMINS} $USER, then log in again"
 
 
 @dataclass(slots=True)
@@ -58,6 +57,7 @@ class Gateway309:
         tcp_port: port on the loopback interface to listen on as well, read-only; 0 for any free one, None for none.
         writable: clients of the Unix socket may write objects, command network states and use LSS.
         inherited: a socket that listens at ``path`` already; whoever has opened it takes it away.
+        rights: who may do what.
     """
 
     def __init__(
@@ -68,6 +68,7 @@ class Gateway309:
         tcp_port: int | None = None,
         writable: bool = False,
         inherited: socket.socket | None = None,
+        rights: Rights | None = None,
     ) -> None:
         self.path = path
         self.tcp_port = tcp_port
@@ -75,6 +76,7 @@ class Gateway309:
         self._supervisor = supervisor
         self._writable = writable
         self._inherited = inherited
+        self._rights = rights or Rights()
         self._listeners: list[socket.socket] = []
         self._servers: list[asyncio.Server] = []
         self._inode = 0
@@ -91,7 +93,7 @@ class Gateway309:
         if self._inherited is not None:
             unix = self._inherited.dup()
         else:
-            unix = open_listener(self.path, "--gateway")
+            unix = open_listener(self.path, self._rights, "--gateway")
             self._inode = os.stat(self.path).st_ino
         self._listeners.append(unix)
         # not start_unix_server: from Python 3.13 on that takes the path away, whoever owns it
@@ -121,12 +123,13 @@ class Gateway309:
     # -- clients ------------------------------------------------------------------------------------------------------
 
     async def _on_unix(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        role = Peer.of(writer.get_extra_info("socket")).role
-        if role is None:
-            await self._turn_away(writer, f"this user may not use the gateway: sudo usermod -aG {USERS} $USER")
+        peer = self._rights.peer(writer.get_extra_info("socket"))
+        refusal = self._rights.refusal(peer, Role.WATCH, "the gateway")
+        if refusal is not None:
+            await self._turn_away(writer, str(refusal))
             return
-        reason = _CLOSED if not self._writable else "" if role is Role.CONFIGURE else _NO_ADMIN
-        await self._admit(reader, writer, reason)
+        denied = self._rights.refusal(peer, Role.CONFIGURE, "writing")
+        await self._admit(reader, writer, str(denied or "") if self._writable else _CLOSED)
 
     async def _on_tcp(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         await self._admit(reader, writer, _TCP_READS)

@@ -7,6 +7,7 @@ from typing import Any
 
 from daemon.api.encoder_methods import ENCODER_METHODS
 from daemon.api.gamepad_methods import GAMEPAD_METHODS
+from daemon.api.lease_methods import LEASE_METHODS
 from daemon.api.localisation_methods import LOCALISATION_METHODS
 from daemon.api.nxt_methods import NXT_METHODS
 from daemon.api.parameters import REQUIRED, Method, Param, Role
@@ -33,13 +34,14 @@ def _angle(name: str, doc: str, **more: Any) -> Param:
 
 
 _TALK = (
-    Method("hello", "Who answers.", (), "api_version, version, robot, state, lease_timeout_s", Role.WATCH),
+    Method("hello", "Who answers.", (), "api_version, version, robot, state, lease_timeout_s, role", Role.STOP),
     Method("api.schema", "Every method, event and error.", (), "methods, notifications, errors", Role.WATCH),
     Method(
         "status",
         "State at a glance.",
         (),
-        "state, message, nodes, brakes, vehicle, localisation, bus, cycle, recording, events",
+        "state, message, nodes, brakes, vehicle, holder (who has the robot), role (the caller's), localisation, bus, "
+        "cycle, recording, events",
         Role.WATCH,
     ),
     Method(
@@ -57,10 +59,6 @@ _TALK = (
         "frames, next, lost",
         Role.WATCH,
     ),
-    Method("lease.renew", "The client is alive: its motions go on.", (), "lease", Role.WATCH),
-    Method(
-        "lease.close", "Stop the motions of this connection; answers when they have ended.", (), "state", Role.WATCH
-    ),
 )
 
 _WHOLE = (
@@ -69,7 +67,7 @@ _WHOLE = (
         "Stop everything now; answers at rest. Needs no lease.",
         (),
         "state, enabled, message",
-        Role.WATCH,
+        Role.STOP,
         urgent=True,
     ),
     Method(
@@ -77,7 +75,7 @@ _WHOLE = (
         "Emergency stop: quick stop, disable, latched until reset. Needs no lease.",
         (Param("reason", "string", "why, for people", default="commanded by a person"),),
         "state, message",
-        Role.WATCH,
+        Role.STOP,
         urgent=True,
     ),
     Method("reset", "Clear a latched emergency stop and faults.", (), "state, message"),
@@ -379,6 +377,7 @@ METHODS: dict[str, Method] = {
     method.name: method
     for method in (
         *_TALK,
+        *LEASE_METHODS,
         *_WHOLE,
         *_MOTOR,
         *_VEHICLE,

@@ -12,8 +12,9 @@ from canhelm.errors import UsageError
 
 
 class Role(StrEnum):
-    """What a peer may do; each role includes those before it."""
+    """What a peer may do; each role includes those before it, and whoever may open the socket has the first."""
 
+    STOP = "stop"
     WATCH = "watch"
     DRIVE = "drive"
     CONFIGURE = "configure"

@@ -1,7 +1,7 @@
 """Who is at the other end of the socket, and what they may do.
 
-The daemon's own user and root may do everything. Where the groups ``canhelm`` and ``canhelm-admin`` exist, members of
-the first may watch, drive and stop, members of the second may configure too; others may do nothing.
+The daemon's own user and root may do everything, others what the groups of their process give them. The kernel tells
+user and groups of a peer (unix(7)): no name service that is slow keeps the control cycle waiting for that.
 """
 
 from __future__ import annotations
@@ -11,15 +11,32 @@ import os
 import pwd
 import socket
 import struct
+from collections.abc import Collection
 from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
 
 from canhelm.errors import PermissionRefused
-from daemon.api.parameters import Method, Role
+from canhelm.protocol import DRIVERS
+from daemon.api.parameters import Role
 
-USERS = "canhelm"
-ADMINS = "canhelm-admin"
-_RANK = {Role.WATCH: 1, Role.DRIVE: 2, Role.CONFIGURE: 3}
 _CREDENTIALS = struct.Struct("3i")
+_SO_PEERGROUPS = 59
+"""Since Linux 4.13 (asm-generic/socket.h)."""
+_GROUPS_BYTES = 1024
+"""What Python asks for at most: 256 groups."""
+_RANK = {role: rank for rank, role in enumerate(Role)}
+_COMMAND_LENGTH = 80
+
+
+@dataclass(frozen=True, slots=True)
+class Groups:
+    """Names of the groups whose members may use a robot; members of each may do what those before it may."""
+
+    watch: str = "canhelm-watch"
+    drive: str = DRIVERS
+    configure: str = "canhelm-admin"
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,53 +45,129 @@ class Peer:
 
     Attributes:
         pid: its process id, 0 where unknown.
-        role: the most it may do; None: nothing.
+        uid: its user.
+        groups: its groups.
+        role: the most it may do.
     """
 
     pid: int
-    role: Role | None
+    uid: int
+    groups: frozenset[int]
+    role: Role
 
     @classmethod
     def nobody(cls) -> Peer:
         """A peer that is not known yet."""
-        return cls(0, None)
+        return cls(0, -1, frozenset(), Role.STOP)
 
-    @classmethod
-    def of(cls, connection: socket.socket) -> Peer:
-        """The peer of a connected Unix socket, from the kernel's credentials (unix(7), SO_PEERCRED)."""
+    @property
+    def user(self) -> str:
+        """Name of its user."""
+        return _user(self.uid)
+
+    def details(self) -> dict[str, Any]:
+        """User, process id and command, for status and messages."""
+        return {"user": self.user, "pid": self.pid, "command": command_of(self.pid)}
+
+
+class Rights:
+    """Which groups give which role.
+
+    Args:
+        groups: their names. They are looked up here alone; one that the system does not have gives nothing.
+    """
+
+    def __init__(self, groups: Groups | None = None) -> None:
+        names = groups or Groups()
+        self._names = {Role.WATCH: names.watch, Role.DRIVE: names.drive, Role.CONFIGURE: names.configure}
+        found = {role: _number(name) for role, name in self._names.items()}
+        self._numbers = {role: number for role, number in found.items() if number is not None}
+
+    @property
+    def driving(self) -> str:
+        """The group whose members drive."""
+        return self._names[Role.DRIVE]
+
+    @property
+    def numbers(self) -> list[int]:
+        """Ids of the groups that there are."""
+        return sorted(set(self._numbers.values()))
+
+    def peer(self, connection: socket.socket) -> Peer:
+        """The peer of a connected Unix socket."""
         raw = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
         pid, uid, gid = _CREDENTIALS.unpack(raw)
-        return cls(pid, role_of(uid, gid))
+        groups = frozenset((gid, *_further_groups(connection)))
+        return Peer(pid, uid, groups, self.role_of(uid, groups))
 
-    def require(self, method: Method) -> None:
-        """Raise PermissionRefused unless this peer may call a method."""
-        if self.role is None or _RANK[self.role] < _RANK[method.role]:
-            group = ADMINS if method.role is Role.CONFIGURE else USERS
-            raise PermissionRefused(
-                f"this user may not call {method.name}",
-                remedy=f"join the group: sudo usermod -aG {group} $USER, then log in again",
-            )
+    def role_of(self, uid: int, groups: Collection[int]) -> Role:
+        """What a user in these groups may do."""
+        if uid in (0, os.getuid()):
+            return Role.CONFIGURE
+        held = [role for role, number in self._numbers.items() if number in groups]
+        return max(held, key=_RANK.__getitem__, default=Role.STOP)
+
+    def refusal(self, peer: Peer, role: Role, what: str) -> PermissionRefused | None:
+        """Why a peer may not do something; None where it may.
+
+        Args:
+            peer: who wants it.
+            role: the least one that will do.
+            what: needs it, for people.
+        """
+        if _RANK[peer.role] >= _RANK[role]:
+            return None
+        giving = " or ".join(name for other, name in self._names.items() if _RANK[other] >= _RANK[role])
+        has = ", ".join(sorted(map(_group, peer.groups)))
+        return PermissionRefused(
+            f"{what} needs the role {role}, which the group {giving} gives; {peer.user} is in {has}",
+            remedy=self._remedy(role, peer.user),
+        )
+
+    def _remedy(self, role: Role, user: str) -> str:
+        group = self._names[role]
+        join = f"sudo usermod -aG {group} {user}, then log in again"
+        return join if role in self._numbers else f"sudo groupadd --system {group}, start the daemon anew; {join}"
 
 
-def role_of(uid: int, gid: int) -> Role | None:
-    """What a user may do, by the groups the system lists for it."""
-    if uid in (0, os.getuid()):
-        return Role.CONFIGURE
-    groups = _groups_of(uid, gid)
-    if ADMINS in groups:
-        return Role.CONFIGURE
-    return Role.DRIVE if USERS in groups else None
-
-
-def _groups_of(uid: int, gid: int) -> set[str]:
+def command_of(pid: int) -> str:
+    """The command line of a process, for people."""
     try:
-        numbers = os.getgrouplist(pwd.getpwuid(uid).pw_name, gid)
+        words = Path(f"/proc/{pid}/cmdline").read_bytes()[:4096].decode(errors="replace").split("\0")
+    except OSError:
+        return "unknown command"
+    if len(words) > 1 and Path(words[0]).name.startswith("python"):
+        del words[0]
+    told = " ".join((Path(words[0]).name, *words[1:])).strip()
+    return "".join(sign for sign in told if sign.isprintable())[:_COMMAND_LENGTH]
+
+
+def _further_groups(connection: socket.socket) -> tuple[int, ...]:
+    try:
+        raw = connection.getsockopt(socket.SOL_SOCKET, _SO_PEERGROUPS, _GROUPS_BYTES)
+    except OSError:  # an older kernel, or more groups than fit: the user's main one counts
+        return ()
+    return struct.unpack(f"{len(raw) // 4}I", raw)
+
+
+def _number(group: str) -> int | None:
+    try:
+        return grp.getgrnam(group).gr_gid
     except KeyError:
-        numbers = [gid]
-    names = set()
-    for number in numbers:
-        try:
-            names.add(grp.getgrgid(number).gr_name)
-        except KeyError:
-            continue
-    return names
+        return None
+
+
+@lru_cache(maxsize=256)
+def _group(number: int) -> str:
+    try:
+        return grp.getgrgid(number).gr_name
+    except KeyError:
+        return str(number)
+
+
+@lru_cache(maxsize=256)
+def _user(number: int) -> str:
+    try:
+        return pwd.getpwuid(number).pw_name
+    except KeyError:
+        return f"user {number}"

@@ -9,17 +9,16 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
-import shutil
 import socket
-import stat
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
 from canhelm import protocol
-from canhelm.errors import ConfigError, PermissionRefused, Refused
 from daemon.api.connection import Connection
+from daemon.api.listeners import open_listener, remove_socket
+from daemon.api.peers import Rights
 
 LOGGER = logging.getLogger("canhelm.api")
 MAX_CLIENTS = 32
@@ -27,7 +26,6 @@ RESERVED_CLIENTS = 8
 """Further clients that may only stop: a crowd must not keep anybody from stopping the robot."""
 IDLE_S = 2.0
 """Silence after which a client may lose its place to another one (longer than a lease lives without renewal)."""
-GROUP = "canhelm"
 
 
 class Backend(Protocol):
@@ -57,7 +55,7 @@ class Backend(Protocol):
         """State at a glance, for JSON."""
         ...
 
-    def open_lease(self, client: str) -> str:
+    def open_lease(self, client: str, details: Mapping[str, Any]) -> str:
         """A lease for a client that is about to move something; returns its id."""
         ...
 
@@ -71,6 +69,10 @@ class Backend(Protocol):
 
     async def end_lease(self, lease: str, reason: str) -> None:
         """The client lets go: its motions stop; returns when they have ended."""
+        ...
+
+    async def take_lease(self, lease: str) -> str | None:
+        """Take the robot over for a lease; returns who had it, once the motions of others have ended."""
         ...
 
     async def call(self, method: str, params: dict[str, Any], lease: str | None) -> dict[str, Any]:
@@ -106,11 +108,19 @@ class Server:
         backend: what carries the methods out.
         path: where to listen.
         inherited: a socket that listens there already; whoever has opened it takes it away.
+        rights: who may do what.
     """
 
-    def __init__(self, backend: Backend, path: Path, inherited: socket.socket | None = None) -> None:
+    def __init__(
+        self,
+        backend: Backend,
+        path: Path,
+        inherited: socket.socket | None = None,
+        rights: Rights | None = None,
+    ) -> None:
         self.backend = backend
         self.path = path
+        self.rights = rights or Rights()
         self.counters = Counters()
         self.connections: set[Connection] = set()
         self.tasks: set[asyncio.Task[None]] = set()
@@ -131,7 +141,7 @@ class Server:
         if self._inherited is not None:
             self._listener = self._inherited.dup()
         else:
-            self._listener = open_listener(self.path)
+            self._listener = open_listener(self.path, self.rights)
             self._inode = os.stat(self.path).st_ino
         # not create_unix_server: from Python 3.13 on that takes the path away, whoever owns it
         self._server = await asyncio.get_running_loop().create_server(self._accept, sock=self._listener)
@@ -206,82 +216,3 @@ class Server:
         for connection in self.connections:
             if connection.subscribed:
                 connection.publish(line)
-
-
-def open_listener(path: Path, option: str = "--socket") -> socket.socket:
-    """A listening socket at a path, 0660, of the group canhelm where there is one; a dead daemon's is replaced.
-
-    Args:
-        path: where.
-        option: how a person chooses another place.
-
-    Raises:
-        Refused: another daemon answers there.
-        ConfigError: the path is too long or taken by something that is no socket.
-        PermissionRefused: this user may not create it.
-    """
-    try:
-        _own_folder(path.parent, option)
-        _clear_stale(path, option)
-        listener = _bind(path)
-    except PermissionError as error:
-        raise PermissionRefused(
-            f"no socket can be opened at {path}: {error.strerror}", remedy=f"choose another place with {option} PATH"
-        ) from None
-    except OSError as error:
-        raise ConfigError(
-            f"no socket can be opened at {path}: {error.strerror or error}",
-            remedy=f"choose another place with {option} PATH (at most 107 characters)",
-        ) from None
-    _give_to_group(path)
-    return listener
-
-
-def _bind(path: Path) -> socket.socket:
-    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    before = os.umask(0o117)
-    try:
-        listener.bind(os.fspath(path))
-    except OSError:
-        listener.close()
-        raise
-    finally:
-        os.umask(before)
-    return listener
-
-
-def remove_socket(path: Path, inode: int) -> None:
-    """Take a socket away, unless another one has taken its place since, or it is not ours (``inode`` 0)."""
-    try:
-        if inode and os.stat(path).st_ino == inode:
-            os.unlink(path)
-    except FileNotFoundError:
-        pass
-
-
-def _own_folder(folder: Path, option: str) -> None:
-    """Make the folder; a shared place such as /tmp must not hold one that somebody else has put there."""
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    if folder == protocol.user_folder():
-        found = os.lstat(folder)
-        if found.st_uid != os.getuid() or not stat.S_ISDIR(found.st_mode):
-            raise PermissionRefused(f"{folder} belongs to somebody else", remedy=f"choose a place with {option} PATH")
-
-
-def _clear_stale(path: Path, option: str) -> None:
-    try:
-        mode = os.lstat(path).st_mode
-    except FileNotFoundError:
-        return
-    if not stat.S_ISSOCK(mode):
-        raise ConfigError(f"{path} is there and is no socket", remedy=f"choose another place with {option} PATH")
-    if protocol.is_live(path):
-        raise Refused(f"a daemon already answers on {path}", remedy=f"stop it first, or give this one {option} PATH")
-    os.unlink(path)
-
-
-def _give_to_group(path: Path) -> None:
-    try:
-        shutil.chown(path, group=GROUP)
-    except (LookupError, PermissionError):
-        LOGGER.info("group %s is not there or not ours: %s stays with this user's group", GROUP, path)

@@ -17,6 +17,8 @@ WATCHED_S = 1.0
 """How long the daemon's counters are watched: what is not counted meanwhile is over."""
 STARTING = ("waiting", "booting")
 """States of a vehicle whose nodes are being configured, which a serial line has to carry beside its cycle."""
+LESSER_ROLES = {"watch": ("only watch and stop", "canhelm"), "drive": ("watch, drive and stop", "canhelm-admin")}
+"""What those who may not do everything may do, and the group that gives the next role where no other was named."""
 SLOW_LINE = 0.8
 """Share of its planned rate below which a serial line is slow."""
 FASTER_LINE = "free this machine; a USB adapter needs its latency timer at 1 ms (setserial DEVICE low_latency)"
@@ -38,6 +40,7 @@ def status_findings(status: Mapping[str, Any], earlier: Mapping[str, Any]) -> It
     else:
         yield Finding("vehicle", "note" if state in STARTING else "ok", sentence)
     yield from _setup_findings(status)
+    yield from _role_findings(status)
     nodes = status.get("nodes") or ()
     for node in nodes:
         yield _node_finding(node)
@@ -59,6 +62,16 @@ def _setup_findings(status: Mapping[str, Any]) -> Iterator[Finding]:
         yield Finding("setup", "note", "this robot was not set up, and does not drive before", "canhelm setup")
     elif status.get("setup") == "waived" and is_own(status.get("profile_file")):
         yield Finding("setup", "note", "its setup is waived: nobody has looked at its wheels", "canhelm setup")
+
+
+def _role_findings(status: Mapping[str, Any]) -> Iterator[Finding]:
+    role = status.get("role")
+    if role == "configure":
+        yield Finding("role", "ok", "you may watch, drive and configure this robot")
+    elif role in LESSER_ROLES:
+        may, group = LESSER_ROLES[role]
+        mend = f"for more: sudo usermod -aG {group} $USER, then log in again (docs/rights.md)"
+        yield Finding("role", "note", f"you may {may} this robot", mend)
 
 
 def _wire_findings(bus: Mapping[str, Any], earlier: Mapping[str, Any], *, anyone: bool) -> Iterator[Finding]:

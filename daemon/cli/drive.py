@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from cyclopts import App, Parameter
 
 from daemon.cli.motion import run_motion
-from daemon.cli.options import DEFAULT, NoWait, Options
+from daemon.cli.options import DEFAULT, MOTION, MotionOptions, NoWait, Options
 from daemon.cli.output import Json
 
 app = App(name="drive", help="Drive the vehicle.")
@@ -15,7 +15,7 @@ app = App(name="drive", help="Drive the vehicle.")
 
 @app.command
 def parallel(
-    *, angle: float, speed: float, duration: float, no_wait: NoWait = False, options: Options = DEFAULT
+    *, angle: float, speed: float, duration: float, no_wait: NoWait = False, options: MotionOptions = MOTION
 ) -> int:
     """Move in a direction without turning.
 
@@ -36,7 +36,13 @@ def parallel(
 
 @app.command
 def turn(
-    *, rear: float, front: float, speed: float, duration: float, no_wait: NoWait = False, options: Options = DEFAULT
+    *,
+    rear: float,
+    front: float,
+    speed: float,
+    duration: float,
+    no_wait: NoWait = False,
+    options: MotionOptions = MOTION,
 ) -> int:
     """Drive an arc with fixed headings of both pairs.
 
@@ -65,7 +71,7 @@ def heading(
     speed: float,
     duration: float,
     no_wait: NoWait = False,
-    options: Options = DEFAULT,
+    options: MotionOptions = MOTION,
 ) -> int:
     """Steer to a heading while driving, on vehicles that can.
 
@@ -91,7 +97,7 @@ def rotate(
     *,
     duration: float | None = None,
     no_wait: NoWait = False,
-    options: Options = DEFAULT,
+    options: MotionOptions = MOTION,
 ) -> int:
     """Turn about the own centre, on vehicles that can; for a time or until Ctrl-C or `canhelm stop`.
 
@@ -118,7 +124,7 @@ def to(
     speed: float | None = None,
     published: Annotated[bool, Parameter(negative=())] = False,
     no_wait: NoWait = False,
-    options: Options = DEFAULT,
+    options: MotionOptions = MOTION,
 ) -> int:
     """Drive to a place in the shortest time, on vehicles that can; place and heading are reached together.
 
@@ -161,7 +167,7 @@ def path(
     published: Annotated[bool, Parameter(negative=())] = False,
     dry_run: Annotated[bool, Parameter(negative=())] = False,
     no_wait: NoWait = False,
-    options: Options = DEFAULT,
+    options: MotionOptions = MOTION,
 ) -> int:
     """Follow a path of lines and arcs, on vehicles that can.
 
@@ -196,7 +202,7 @@ def joystick(
     *,
     pads: Annotated[bool, Parameter(name="--list", negative=())] = False,
     pad: str | None = None,
-    options: Options = DEFAULT,
+    options: MotionOptions = MOTION,
 ) -> int:
     """Drive with a gamepad that is plugged into this machine, until Ctrl-C; the dead-man button is held meanwhile.
 

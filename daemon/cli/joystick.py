@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from canhelm.aio import Client
 from canhelm.errors import NodeAbsent, PermissionRefused
-from daemon.cli.motion import CLEAR_LINE, INTERRUPTED
-from daemon.cli.options import Options
+from daemon.cli.motion import CLEAR_LINE, INTERRUPTED, takeover_text
+from daemon.cli.options import MotionOptions
 from daemon.cli.output import say, show, wants_json, words
 from daemon.gamepad.driver import PERIOD_S, VALID_FOR_MS, PadDriver
 from daemon.gamepad.mapping import Mapping
@@ -53,12 +53,12 @@ def _table(pads: Sequence[dict[str, Any]]) -> Table:
     return grid
 
 
-def drive_joystick(wanted: str | None, options: Options) -> int:
+def drive_joystick(wanted: str | None, options: MotionOptions) -> int:
     """Drive until interrupted; the exit code.
 
     Args:
         wanted: name or path of the pad; None: the first one.
-        options: which daemon.
+        options: which daemon, and whether to take the robot over.
 
     Raises:
         CanhelmError: no pad that can be read and has what the profile names, or the daemon is lost.
@@ -70,7 +70,7 @@ def drive_joystick(wanted: str | None, options: Options) -> int:
     return INTERRUPTED
 
 
-async def _drive(wanted: str | None, options: Options) -> None:
+async def _drive(wanted: str | None, options: MotionOptions) -> None:
     task = asyncio.current_task()
     assert task is not None
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -79,6 +79,8 @@ async def _drive(wanted: str | None, options: Options) -> None:
     async with Client(options.socket, options.robot) as client:
         mapping = Mapping(await client.call("drive.gamepad"))
         driver = PadDriver(client, mapping, _tell, _draw)
+        if options.takeover:
+            say(takeover_text(await client.call("lease.take")))
         while True:
             _greet(pad, mapping)
             try:

@@ -11,7 +11,7 @@ from types import FrameType
 from typing import Any
 
 from canhelm.client import Client
-from daemon.cli.options import Options
+from daemon.cli.options import MotionOptions
 from daemon.cli.output import say, show, words
 
 INTERRUPTED = 130
@@ -19,11 +19,11 @@ PROGRESS_HZ = 5.0
 CLEAR_LINE = "\r\x1b[K"
 
 
-def run_motion(options: Options, method: str, /, *, no_wait: bool = False, **params: Any) -> int:
+def run_motion(options: MotionOptions, method: str, /, *, no_wait: bool = False, **params: Any) -> int:
     """Call a motion's method and print its result.
 
     Args:
-        options: which daemon, and how to print.
+        options: which daemon, how to print, and whether to take the robot over.
         method: as in ``api.schema``.
         no_wait: hand the motion to the daemon and print its id.
         params: the method's parameters.
@@ -32,6 +32,8 @@ def run_motion(options: Options, method: str, /, *, no_wait: bool = False, **par
         The exit code: 0, or 130 where a signal interrupted it and the motion was stopped.
     """
     with options.client() as client:
+        if options.takeover:
+            say(takeover_text(client.call("lease.take")))
         if no_wait:
             show(client.call(method, wait=False, **params), json=options.json)
             return 0
@@ -47,6 +49,11 @@ def run_motion(options: Options, method: str, /, *, no_wait: bool = False, **par
             return INTERRUPTED
         show(result, json=options.json)
     return 0
+
+
+def takeover_text(taken: dict[str, Any]) -> str:
+    """What ``lease.take`` has answered, in words."""
+    return f"taken over from {taken['taken_from']}" if taken["taken_from"] else "nobody else had the robot"
 
 
 @contextmanager

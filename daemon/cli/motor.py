@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from cyclopts import App, Parameter
 
 from daemon.cli.motion import run_motion
-from daemon.cli.options import DEFAULT, Node, NoWait, Options, node_of
+from daemon.cli.options import DEFAULT, MOTION, MotionOptions, Node, NoWait, Options, node_of
 from daemon.cli.output import show
 
 app = App(name="motor", help="Enable, turn and stop one motor.")
@@ -28,7 +28,7 @@ def velocity(
     wheel: Annotated[bool, Parameter(negative=())] = False,
     duration: float | None = None,
     no_wait: NoWait = False,
-    options: Options = DEFAULT,
+    options: MotionOptions = MOTION,
 ) -> int:
     """Turn a motor at a velocity, for a time or until Ctrl-C or `canhelm stop`.
 
@@ -56,7 +56,7 @@ def position(
     relative: Annotated[bool, Parameter(negative=())] = False,
     velocity: float | None = None,
     no_wait: NoWait = False,
-    options: Options = DEFAULT,
+    options: MotionOptions = MOTION,
 ) -> int:
     """Turn a motor to a position.
 
@@ -83,7 +83,7 @@ def current(
     *,
     duration: float | None = None,
     no_wait: NoWait = False,
-    options: Options = DEFAULT,
+    options: MotionOptions = MOTION,
 ) -> int:
     """Feed a motor with a current, for a time or until Ctrl-C or `canhelm stop`.
 
@@ -101,7 +101,7 @@ def current(
 
 
 @app.command
-def home(node: Node, /, *, method: int, no_wait: NoWait = False, options: Options = DEFAULT) -> int:
+def home(node: Node, /, *, method: int, no_wait: NoWait = False, options: MotionOptions = MOTION) -> int:
     """Home a motor.
 
     Example: `canhelm motor home 1 --method 35`
@@ -116,7 +116,7 @@ def home(node: Node, /, *, method: int, no_wait: NoWait = False, options: Option
 
 @app.command
 def step(
-    node: Node, rpm: float, /, *, duration: float = 1.0, no_wait: NoWait = False, options: Options = DEFAULT
+    node: Node, rpm: float, /, *, duration: float = 1.0, no_wait: NoWait = False, options: MotionOptions = MOTION
 ) -> int:
     """A step of velocity on one motor.
 

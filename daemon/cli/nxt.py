@@ -9,7 +9,7 @@ from cyclopts import App, Parameter
 
 from canhelm.errors import UsageError
 from daemon.cli.motion import run_motion
-from daemon.cli.options import DEFAULT, NoWait, Options
+from daemon.cli.options import DEFAULT, MOTION, MotionOptions, NoWait, Options
 from daemon.cli.output import show
 
 app = App(name="nxt", help="Drive a robot on an NXT brick: lines, bends, poses, several moves in a row.")
@@ -67,7 +67,7 @@ def line(
     feedback: Feedback = False,
     driving: Driving = STEADY,
     no_wait: NoWait = False,
-    options: Options = DEFAULT,
+    options: MotionOptions = MOTION,
 ) -> int:
     """Drive straight on.
 
@@ -93,7 +93,7 @@ def bend(
     feedback: Feedback = False,
     driving: Driving = STEADY,
     no_wait: NoWait = False,
-    options: Options = DEFAULT,
+    options: MotionOptions = MOTION,
 ) -> int:
     """Drive along a circle.
 
@@ -125,7 +125,7 @@ def goto(
     open_loop: Annotated[bool, Parameter(negative=())] = False,
     driving: Driving = STEADY,
     no_wait: NoWait = False,
-    options: Options = DEFAULT,
+    options: MotionOptions = MOTION,
 ) -> int:
     """Drive to a pose as seen from where the robot stands; `canhelm drive to` counts from where the daemon began.
 
@@ -153,7 +153,7 @@ def moves(
     feedback: Feedback = False,
     driving: Driving = STEADY,
     no_wait: NoWait = False,
-    options: Options = DEFAULT,
+    options: MotionOptions = MOTION,
 ) -> int:
     """Drive several moves in a row, each from rest to rest.
 

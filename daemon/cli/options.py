@@ -34,7 +34,17 @@ class Options:
         return Client(self.socket, self.robot)
 
 
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True)
+class MotionOptions(Options):
+    """Which daemon shall move something, and whether whoever moves it now has to let go."""
+
+    takeover: Annotated[bool, Parameter(negative=())] = False
+    """Take the robot over from whoever moves it now; that comes to rest first."""
+
+
 DEFAULT = Options()
+MOTION = MotionOptions()
 
 
 def agreed(question: str) -> bool:

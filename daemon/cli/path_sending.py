@@ -10,14 +10,14 @@ import msgspec
 
 from canhelm.errors import CanhelmError
 from daemon.cli.motion import run_motion
-from daemon.cli.options import Options
+from daemon.cli.options import MotionOptions, Options
 from profiles.path_file import PathFile, load_path_file
 
 MAX_PART_CHARACTERS = 40_000
 """Pieces in one request, as JSON: the daemon reads lines of 64 KiB at most."""
 
 
-def drive_path(options: Options, name: str, /, *, no_wait: bool, **params: Any) -> int:
+def drive_path(options: MotionOptions, name: str, /, *, no_wait: bool, **params: Any) -> int:
     """Read a path file, send it, drive it; the exit code.
 
     Args:

@@ -44,6 +44,9 @@ def run(
     faults: Path | None = None,
     runs: str | None = None,
     runs_mb: int = 200,
+    watch_group: str = "canhelm-watch",
+    drive_group: str = "canhelm",
+    configure_group: str = "canhelm-admin",
 ) -> int:
     """Run a robot's daemon in the foreground until Ctrl-C or SIGTERM; then it stops the vehicle and goes down.
 
@@ -71,6 +74,9 @@ def run(
         runs: Folder in which each motion leaves a run, or `off`; the default is the service's or the person's state
             folder (~/.local/state/canhelm/NAME/runs).
         runs_mb: What all runs may take; the oldest are deleted.
+        watch_group: Members of this group may watch the robot (docs/rights.md).
+        drive_group: Members of this one may drive it, too.
+        configure_group: Members of this one may change its settings, too.
     """
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is not signal.SIG_IGN:
@@ -111,6 +117,7 @@ def run(
         runs=_store(runs, runs_mb, robot.name),
         profile_file=loaded.path.resolve() if loaded else None,
         faults=struck_by,
+        groups=(watch_group, drive_group, configure_group),
     )
     runner: Callable[[Coroutine[Any, Any, str]], str] = run_patient if simulates(chosen) else asyncio.run
     say(runner(_live(make_app, profile, robot)))

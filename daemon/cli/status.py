@@ -89,6 +89,8 @@ def table(data: Mapping[str, Any]) -> RenderableType:
     sections = {title: data.get(title) for title in ("vehicle", "localisation", "motions", "cycle")}
     sections |= {**_bus_groups(data.get("bus") or {}), "recording": data.get("recording")}
     parts += [_section(title, value) for title, value in sections.items() if value]
+    if data.get("holder"):
+        parts.append(f"held by {data['holder'].get('client')}")
     parts += [_event(event) for event in list(data.get("events") or ())[-SHOWN_EVENTS:]]
     return Group(*parts)
 
@@ -100,6 +102,8 @@ def _headline(data: Mapping[str, Any]) -> RenderableType:
     line = Text.assemble(str(data.get("robot")), "  ", (state, f"bold {_colour(state)}"))
     if data.get("message"):
         line.append(f"  {data['message']}")
+    if data.get("role"):
+        line.append(f"  (your role: {data['role']})", "dim")
     return line
 
 

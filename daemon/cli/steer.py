@@ -7,12 +7,12 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from daemon.cli.motion import run_motion
-from daemon.cli.options import DEFAULT, NoWait, Options
+from daemon.cli.options import MOTION, MotionOptions, NoWait
 
 Pair = Annotated[str, Parameter(help="front or rear.")]
 
 
-def steer(pair: Pair, angle_deg: float, /, *, no_wait: NoWait = False, options: Options = DEFAULT) -> int:
+def steer(pair: Pair, angle_deg: float, /, *, no_wait: NoWait = False, options: MotionOptions = MOTION) -> int:
     """Turn a pair of wheels to a heading, the other pair braked.
 
     Example: `canhelm steer front -30`

@@ -22,8 +22,9 @@ A method marked *lease* moves something, and the motion belongs to the connectio
 it sends `lease.renew` every {protocol.RENEW_PERIOD_S:g} s. The motion stops when none came for the `lease_timeout_s`
 that `hello` tells, and when the connection ends. With `wait` false, a motion with an end is handed to the daemon.
 
-Each method has a role: *{Role.WATCH}* and *{Role.DRIVE}* are for members of the group `canhelm`, *{Role.CONFIGURE}* is
-for those of `canhelm-admin`. Which motions a robot has, `status` tells under `vehicle.methods`.
+Each method has a role: *{Role.STOP}* is for whoever may open the socket, *{Role.WATCH}*, *{Role.DRIVE}* and
+*{Role.CONFIGURE}* are for members of the groups `canhelm-watch`, `canhelm` and `canhelm-admin`
+([who may do what](../rights.md)). Which motions a robot has, `status` tells under `vehicle.methods`.
 
 """
 COLUMNS = ("parameter", "type", "unit", "default", "range", "meaning")

@@ -142,7 +142,7 @@ class Commands:
             if running is not None:
                 return running
             motion = supervisor.vehicle.motion(method, params, holder(params, lease))
-            return await run_motion(supervisor, motion, params)
+            return await run_motion(supervisor, motion, params, lease)
 
         return handle
 

@@ -1,10 +1,12 @@
-"""Leases: a motion belongs to somebody alive, who renews."""
+"""Leases: a motion belongs to somebody alive, who renews; one of them has the robot at a time."""
 
 from __future__ import annotations
 
 import asyncio
 import itertools
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from canhelm.errors import Refused
 
@@ -16,10 +18,12 @@ class Lease:
     Attributes:
         client: who holds it, for people.
         expires_s: loop time at which it runs out unless renewed.
+        details: of the client, for programs.
     """
 
     client: str
     expires_s: float
+    details: Mapping[str, Any]
 
 
 class Leases:
@@ -33,12 +37,34 @@ class Leases:
         self.timeout_s = timeout_s
         self._leases: dict[str, Lease] = {}
         self._numbers = itertools.count(1)
+        self._taken: str | None = None
 
-    def open(self, client: str) -> str:
+    def open(self, client: str, details: Mapping[str, Any]) -> str:
         """A new lease for a client; returns its id."""
         lease = f"lease-{next(self._numbers)}"
-        self._leases[lease] = Lease(client, asyncio.get_running_loop().time() + self.timeout_s)
+        self._leases[lease] = Lease(client, asyncio.get_running_loop().time() + self.timeout_s, details)
         return lease
+
+    def take(self, lease: str) -> None:
+        """Let a lease have the robot until it is over, or another one takes it."""
+        self._taken = lease
+
+    def holder(self, motions: Iterable[str | None]) -> str | None:
+        """The lease that has the robot: the one that took it, else the one of a motion; None where it is free.
+
+        Args:
+            motions: the leases of the motions that run.
+        """
+        return next((lease for lease in (self._taken, *motions) if lease is not None and self.alive(lease)), None)
+
+    def alive(self, lease: str) -> bool:
+        """Whether a lease is not over."""
+        return lease in self._leases
+
+    def told(self, lease: str) -> dict[str, Any]:
+        """Who holds a lease, for programs. Raises Refused where it has run out or never was."""
+        known = self._known(lease)
+        return {"client": known.client, **known.details}
 
     def renew(self, lease: str) -> None:
         """Keep a lease alive. Raises Refused where it has run out or never was."""

@@ -40,8 +40,7 @@ class MotorCommands:
                 return drive
         drives = self._supervisor.devices.drives.values()
         have = ", ".join(f"{drive.node} ({drive.name})" if drive.node else drive.name for drive in drives)
-        number = int(node) if str(node).isdigit() else None
-        raise NodeAbsent(f"no drive {node} in this profile", node=number, remedy=f"drives: {have}")
+        raise NodeAbsent(f"no drive {node} in this profile", remedy=f"drives: {have}")
 
     async def _enable(self, params: Params, lease: str | None) -> dict[str, Any]:
         drive = self.drive(params["node"])
@@ -69,11 +68,10 @@ class MotorCommands:
         held = holder(params, lease, endless=duration is None)
         if drive in self._supervisor.vehicle.aside:
             aside = AsideVelocity("motor.velocity", drive, self._wheels(), speed, duration, held)
-            return await run_motion(self._supervisor, aside, params)
+            return await run_motion(self._supervisor, aside, params, lease)
         wheel, count = self._supervisor.vehicle.wheel_of(drive.name)
-        return await run_motion(
-            self._supervisor, WheelVelocity("motor.velocity", drive, wheel, count, speed, duration, held), params
-        )
+        motion = WheelVelocity("motor.velocity", drive, wheel, count, speed, duration, held)
+        return await run_motion(self._supervisor, motion, params, lease)
 
     async def _position(self, params: Params, lease: str | None) -> dict[str, Any]:
         drive = self.drive(params["node"])
@@ -86,9 +84,8 @@ class MotorCommands:
             relative = bool(params.get("relative", False))
             await drive.move_to(int(params["position_qc"]), relative=relative, speed_rpm=speed_rpm)
 
-        return await run_motion(
-            self._supervisor, DriveMove("motor.position", drive, self._wheels(), holder(params, lease), command), params
-        )
+        motion = DriveMove("motor.position", drive, self._wheels(), holder(params, lease), command)
+        return await run_motion(self._supervisor, motion, params, lease)
 
     async def _home(self, params: Params, lease: str | None) -> dict[str, Any]:
         drive = self.drive(params["node"])
@@ -96,9 +93,8 @@ class MotorCommands:
         async def command() -> None:
             await drive.home(int(params["method"]))
 
-        return await run_motion(
-            self._supervisor, DriveMove("motor.home", drive, self._wheels(), holder(params, lease), command), params
-        )
+        motion = DriveMove("motor.home", drive, self._wheels(), holder(params, lease), command)
+        return await run_motion(self._supervisor, motion, params, lease)
 
     async def _current(self, params: Params, lease: str | None) -> dict[str, Any]:
         drive = self.drive(params["node"])
@@ -121,7 +117,7 @@ class MotorCommands:
         motion = DriveMove(
             "motor.current", drive, self._wheels(), held, command, duration_s=duration, until_stopped=duration is None
         )
-        return await run_motion(self._supervisor, motion, params)
+        return await run_motion(self._supervisor, motion, params, lease)
 
     async def _stop(self, params: Params, lease: str | None) -> dict[str, Any]:
         drive = self._present(params)

@@ -126,7 +126,7 @@ class PathCommands:
             raise Refused("the vehicle moves already", remedy="wait for it, or `canhelm stop`")
         if kept is not None:
             self._kept.pop(kept, None)
-        return await run_motion(self._supervisor, plan.motion(holder(params, lease)), params)
+        return await run_motion(self._supervisor, plan.motion(holder(params, lease)), params, lease)
 
 
 async def _at_once() -> None:

@@ -57,6 +57,7 @@ class Service:
         self.renew_lease = supervisor.renew_lease
         self.close_lease = supervisor.close_lease
         self.end_lease = supervisor.end_lease
+        self.take_lease = supervisor.take_lease
         self._supervisor = supervisor
         self._bus = bus
         self._cycle = cycle
@@ -98,6 +99,7 @@ class Service:
             "vehicle": supervisor.vehicle.status(),
             "found": self.found,
             "localisation": self.localiser.status() if self.localiser else None,
+            "holder": supervisor.holder(),
             "limits_active": list(supervisor.active_limits),
             "motions": [motion.summary() for motion in supervisor.motions.values()],
             "bus": self._bus_status(),

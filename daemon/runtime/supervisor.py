@@ -15,7 +15,7 @@ from typing import Any
 from canhelm.errors import CanhelmError, DeviceFault, Interlock, Refused
 from daemon.loops.measurement import Command, Measurement
 from daemon.runtime.events import EventLog
-from daemon.runtime.leases import Leases
+from daemon.runtime.holding import Holding
 from daemon.runtime.motions import Motion
 from daemon.runtime.plausibility import Plausibility
 from daemon.runtime.stopping import MOTION, Stopping
@@ -45,7 +45,8 @@ class Supervisor:
         on_motion: called with each motion that was admitted, before it moves anything.
         remark: what is waited for where the profile has no device.
         setup_lease: the lease of a setup under way, which has the robot to itself; None without one.
-        on_lease_end: called with each lease that is over, by hanging up or running out.
+        open_lease, renew_lease, close_lease, end_lease, holder, on_lease_end: those of
+            :class:`daemon.runtime.holding.Holding`.
         at_end: awaited when the daemon goes down, once the vehicle is at rest and off.
         stop, estop, fault, power_off, until_rest: those of :class:`daemon.runtime.stopping.Stopping`.
     """
@@ -56,16 +57,18 @@ class Supervisor:
         self.master = master
         self.devices = devices
         self.vehicle = vehicle
-        self.leases = Leases(lease_timeout_s)
         self.log = EventLog()
         self.motions: dict[str, Motion] = {}
+        self._holding = holding = Holding(self.motions, self.log, lease_timeout_s)
+        self.leases, self.on_lease_end = holding.leases, holding.on_end
+        self.open_lease, self.renew_lease = holding.open, holding.leases.renew
+        self.close_lease, self.end_lease, self.holder = holding.close, holding.end, holding.told
         self.active_limits: tuple[str, ...] = ()
         self.measurement: Measurement | None = None
         self.command = vehicle.zero
         self.bus_missing = ""
         self.remark = ""
         self.setup_lease: str | None = None
-        self.on_lease_end: list[Callable[[str], None]] = []
         self.at_end: list[Callable[[], Awaitable[object]]] = []
         self.observers: list[Callable[[], None]] = []
         self.on_motion: list[Callable[[Motion], None]] = []
@@ -154,36 +157,38 @@ class Supervisor:
                 remedy="wait for its end, or end it where it runs; `canhelm stop` works at any time",
             )
 
-    def admit(self, motion: Motion) -> None:
+    def admit(self, motion: Motion, lease: str | None = None) -> None:
         """Let a motion begin.
+
+        Args:
+            motion: what shall move.
+            lease: of who asks for it, be it that the motion is handed to the daemon.
 
         Raises:
             EmergencyStop, NodeAbsent, NotReady: as :meth:`require_ready`.
-            Refused: its drives are busy, or its lease has run out.
+            Refused: somebody else has the robot, its drives are busy, or its lease has run out.
             Interlock: a brake stands against it, or somebody's setup.
         """
         self.require_no_setup_of_others(motion.lease)
         self.require_ready(motion.drives)
         if motion.lease is not None:
             self.leases.client(motion.lease)
+        self._holding.require_robot(lease)
         for other in self.motions.values():
             if set(other.drives) & set(motion.drives):
                 raise Refused(
-                    f"motion {other.identity} ({other.kind}, {self._holder(other)}) is running",
-                    remedy="wait for it, or `canhelm stop`",
+                    f"motion {other.identity} ({other.kind}, {self._holding.hand(other)}) is running",
+                    remedy="wait for it, `canhelm stop`, or take the robot over with --takeover (lease.take)",
                 )
         self.brakes.require_released(motion.drives)
         if set(motion.drives) - {drive.name for drive in self.vehicle.aside}:
             self.vehicle.require_free(motion)
         motion.identity = str(next(self._numbers))
         self.motions[motion.identity] = motion
-        LOGGER.info("motion %s (%s) begins, %s", motion.identity, motion.kind, self._holder(motion))
+        LOGGER.info("motion %s (%s) begins, %s", motion.identity, motion.kind, self._holding.hand(motion))
         for told in self.on_motion:
             told(motion)
         self._tasks.spawn(self._carry_out(motion), MOTION)
-
-    def _holder(self, motion: Motion) -> str:
-        return f"held by {self.leases.client(motion.lease)}" if motion.lease else "handed to the daemon"
 
     async def _carry_out(self, motion: Motion) -> None:
         drives = [self.devices.drives[name] for name in motion.drives]
@@ -225,7 +230,7 @@ class Supervisor:
         """One control step: measure, watch, ask the motions, pass the gate, transmit."""
         measurement = self.measurement = self.vehicle.measure(now_s)
         self._stopping.rest.look((*measurement.wheel_speed_m_s, *[drive.speed_m_s for drive in self.vehicle.aside]))
-        self._watch_leases(now_s)
+        self._holding.watch(now_s)
         self._watch_devices(now_s)
         self._watch_readings(measurement, dt_s)
         wanted = self._ask_motions(measurement, dt_s)
@@ -259,10 +264,6 @@ class Supervisor:
             command = asked if command is self.vehicle.zero else _sum(command, asked)
         return command
 
-    def _watch_leases(self, now_s: float) -> None:
-        for lease, client in self.leases.expired(now_s):
-            self.release_motions(lease, f"the lease of {client} ran out")
-
     def _watch_devices(self, now_s: float) -> None:
         if not self._stopping.estop_reason and (pressed := self._stopping.pressed):
             self.estop(pressed)
@@ -294,39 +295,15 @@ class Supervisor:
 
     # --- leases ------------------------------------------------------------------------------------------------
 
-    def open_lease(self, client: str) -> str:
-        """A lease for a client that is about to move something; returns its id."""
-        return self.leases.open(client)
-
-    def renew_lease(self, lease: str) -> None:
-        """Keep a lease alive. Raises Refused where it has run out."""
-        self.leases.renew(lease)
-
-    def close_lease(self, lease: str, reason: str = "its client hung up") -> None:
-        """The client is gone: its motions stop."""
-        self.release_motions(lease, reason)
-        self.leases.close(lease)
-
-    async def end_lease(self, lease: str, reason: str) -> None:
-        """The client lets go: its motions stop; returns when they have ended, streamed ones among them."""
-        held = [motion for motion in self.motions.values() if motion.lease == lease]
-        self.close_lease(lease, reason)
-        for motion in held:
-            await motion.closed.wait()
+    async def take_lease(self, lease: str) -> str | None:
+        """Take the robot over, as :meth:`Holding.take`. Raises Interlock where somebody's setup has it to itself."""
+        self.require_no_setup_of_others(lease)
+        return await self._holding.take(lease)
 
     @property
     def lease_timeout_s(self) -> float:
         """How long a motion goes on without a renewal."""
         return self.leases.timeout_s
-
-    def release_motions(self, lease: str, reason: str) -> None:
-        """Stop every motion that a lease holds."""
-        for motion in list(self.motions.values()):
-            if motion.lease == lease and not motion.stop_reason:
-                self.log.add("warning", "supervisor", f"motion {motion.identity} ({motion.kind}) stops: {reason}")
-                motion.stop(reason)
-        for told in self.on_lease_end:
-            told(lease)
 
     # --- the end -----------------------------------------------------------------------------------------------
 

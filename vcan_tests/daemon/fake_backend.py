@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -40,6 +40,8 @@ class FakeBackend:
         self.called = threading.Event()
         self.ran_out = threading.Event()
         self.renewals = 0
+        self.clients: list[dict[str, Any]] = []
+        self.taken: list[str] = []
         self.at_rest = asyncio.Event()
         self.at_rest.set()
         self.padding = ""
@@ -64,7 +66,8 @@ class FakeBackend:
             "cycle": self.cycle,
         }
 
-    def open_lease(self, client: str) -> str:
+    def open_lease(self, client: str, details: Mapping[str, Any]) -> str:
+        self.clients.append({"client": client, **details})
         lease = f"lease-{len(self._motions) + 1}"
         self._motions[lease] = []
         self._leases[lease] = self._expiry(lease)
@@ -96,6 +99,10 @@ class FakeBackend:
         self.close_lease(lease, reason)
         await self.at_rest.wait()
 
+    async def take_lease(self, lease: str) -> str | None:
+        self.taken.append(lease)
+        return "somebody"
+
     async def call(self, method: str, params: dict[str, Any], lease: str | None) -> dict[str, Any]:
         self.calls.append((method, params, lease))
         self.called.set()
@@ -104,7 +111,7 @@ class FakeBackend:
         failure = FAILURES.get(params.get("node", 0))
         if failure is not None:
             raise failure
-        if lease is not None and "wait" in params:
+        if lease is not None and params.get("wait"):
             way_s = ENDLESS_S if METHODS[method].ends_by or method == "steer" else SHORT_WAY_S
             await self._move(lease, params.get("duration_s") or way_s)
         return {"motion": "1"} if "wait" in params else {"state": self.state}

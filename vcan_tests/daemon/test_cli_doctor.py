@@ -204,6 +204,16 @@ def test_the_time_for_which_a_simulated_robot_had_to_wait_is_told_with_the_cycle
     assert (found.verdict, "waiting for 2.3 s" in found.finding) == ("ok", True)
 
 
+@pytest.mark.parametrize(
+    ("role", "verdict", "mend"),
+    [("configure", "ok", ""), ("drive", "note", "canhelm-admin"), ("watch", "note", "canhelm ")],
+)
+def test_the_own_role_is_told_with_the_group_that_gives_more(role: str, verdict: str, mend: str) -> None:
+    finding = findings(role=role)["role"]
+    assert finding.verdict == verdict
+    assert mend in finding.mend
+
+
 @pytest.mark.parametrize(("before", "verdict"), [(2, "problem"), (3, "note")])
 def test_requests_that_failed_inside_the_daemon_are_a_problem_while_they_do(before: int, verdict: str) -> None:
     assert findings({"api": {"internal_errors": before}}, api={"internal_errors": 3})["api"].verdict == verdict

@@ -18,6 +18,8 @@ from daemon.cli.status import table
 
 STATUS: dict[str, Any] = {
     "robot": "max2d",
+    "role": "drive",
+    "holder": {"client": "alice (pid 77: canhelm drive joystick)"},
     "state": "fault",
     "message": "node 3 (front_left) was lost",
     "nodes": [
@@ -41,7 +43,8 @@ def drawn(status: dict[str, Any], width: int = 120) -> str:
 
 @pytest.mark.parametrize(
     "told",
-    ["max2d  fault  node 3 (front_left) was lost", "-250", "no boot-up; is motor power on?",
+    ["max2d  fault  node 3 (front_left) was lost  (your role: drive)", "held by alice (pid 77: canhelm drive joystick)\n",
+     "-250", "no boot-up; is motor power on?",
      "position error - check the encoder", "rear engaged", "bus: load 0.12\n", "bus trouble: unknown 4\n",
      "front_left: lost - power?"],
 )  # fmt: skip

@@ -9,6 +9,7 @@ import os
 import socket
 import stat
 from collections.abc import AsyncIterator, Awaitable, Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -20,7 +21,8 @@ from daemon.api import gateway309 as gateway_module
 from daemon.api.gateway309 import LOOPBACK, MAX_CLIENTS, Gateway309
 from daemon.api.gateway309_session import Session
 from daemon.api.gateway309_text import MAX_LINE_BYTES
-from daemon.api.peers import Peer
+from daemon.api.parameters import Role
+from daemon.api.peers import Peer, Rights
 from daemon.app import App, GatewayAccess
 from drivers.contract import NodeState
 from profiles.loader import load
@@ -260,16 +262,14 @@ async def test_nobody_writes_unless_the_daemon_was_told_so(app: App, tmp_path: P
 async def test_only_who_may_configure_writes(
     connect: Connect, monkeypatch: pytest.MonkeyPatch, role: str, line: bytes
 ) -> None:
-    from daemon.api.parameters import Role
-
-    monkeypatch.setattr(Peer, "of", lambda connection: Peer(1, Role(role)))
-    assert (await (await connect()).ask(line)).startswith(b"[1] ERROR:100 #this user may only read")
+    monkeypatch.setattr(Rights, "peer", lambda rights, connection: replace(Peer.nobody(), role=Role(role)))
+    assert (await (await connect()).ask(line)).startswith(b"[1] ERROR:100 #writing needs the role configure")
 
 
-async def test_who_has_no_role_is_turned_away(connect: Connect, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Peer, "of", lambda connection: Peer(1, None))
+async def test_who_may_not_watch_is_turned_away(connect: Connect, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Rights, "peer", lambda rights, connection: Peer.nobody())
     client = await connect()
-    assert b"this user may not use the gateway" in await client.answer()
+    assert b"the gateway needs the role watch" in await client.answer()
     assert await client.ended()
 
 

@@ -75,12 +75,13 @@ async def test_an_invalid_profile_is_told_with_its_line_and_not_tried_again(dark
 
 @pytest.fixture(scope="module")
 def people() -> Iterator[None]:
-    """alice drives, carol configures as well, mallory is nobody here."""
+    """alice drives, carol configures, wanda watches, mallory is nobody here."""
     Robot().clear()
-    for name, groups in (("alice", "canhelm"), ("carol", "canhelm,canhelm-admin"), ("mallory", "")):
+    members = {"alice": "canhelm", "carol": "canhelm-admin", "wanda": "canhelm-watch", "mallory": ""}
+    for name, groups in members.items():
         told("useradd", "--no-create-home", "--groups", groups, name)
     yield
-    for name in ("alice", "carol", "mallory"):
+    for name in members:
         told("userdel", name)
 
 
@@ -98,12 +99,21 @@ def test_a_member_of_the_group_drives(robot: Robot) -> None:
 def test_a_member_of_the_group_does_not_configure_and_is_told_who_does(robot: Robot) -> None:
     refused = canhelm("alice", "sdo", "write", "1", "max_following_error", "1000")
     assert refused.returncode == 3
-    assert "sudo usermod -aG canhelm-admin $USER" in refused.stderr
+    assert "sudo usermod -aG canhelm-admin alice" in refused.stderr
 
 
 @pytest.mark.usefixtures("people")
 def test_an_administrator_configures(robot: Robot) -> None:
     assert canhelm("carol", "sdo", "write", "1", "max_following_error", "2000").returncode == 0
+
+
+@pytest.mark.usefixtures("people")
+def test_who_watches_sees_and_stops_the_robot_and_does_not_drive_it(robot: Robot) -> None:
+    assert canhelm("wanda", "status").returncode == 0
+    assert canhelm("wanda", "stop").returncode == 0
+    refused = canhelm("wanda", "drive", "parallel", "--angle", "0", "--speed", "0.2", "--duration", "0.5")
+    assert refused.returncode == 3
+    assert "sudo usermod -aG canhelm wanda" in refused.stderr
 
 
 @pytest.mark.usefixtures("people")

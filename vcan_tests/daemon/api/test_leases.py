@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import pwd
+
 import pytest
 
 from canhelm import protocol
@@ -16,9 +19,26 @@ async def test_a_motion_is_held_by_the_lease_of_its_connection(client: RawClient
     assert backend.calls[0][2] == "lease-1"
 
 
-async def test_a_motion_that_is_handed_over_has_no_lease(client: RawClient, backend: FakeBackend) -> None:
+async def test_the_daemon_is_told_who_hands_a_motion_over(client: RawClient, backend: FakeBackend) -> None:
     await client.ask("motor.velocity", node=1, velocity_rpm=100, duration_s=0.01, wait=False)
-    assert backend.calls[0][2] is None
+    assert backend.calls[0][2] == "lease-1"
+
+
+async def test_a_lease_is_opened_with_user_pid_and_command_of_the_client(
+    client: RawClient, backend: FakeBackend
+) -> None:
+    await client.ask("motor.velocity", node=1, velocity_rpm=100, duration_s=0.01)
+    (told,) = backend.clients
+    assert (told["user"], told["pid"]) == (pwd.getpwuid(os.getuid()).pw_name, os.getpid())
+    assert told["client"] == f"{told['user']} (pid {told['pid']}: {told['command']})"
+
+
+async def test_a_client_takes_the_robot_over_with_the_lease_that_holds_its_next_motion(
+    client: RawClient, backend: FakeBackend
+) -> None:
+    assert (await client.ask("lease.take"))["result"] == {"taken_from": "somebody"}
+    await client.ask("motor.velocity", node=1, velocity_rpm=100, duration_s=0.01)
+    assert backend.taken == [backend.calls[0][2]]
 
 
 async def test_a_motion_without_an_end_cannot_be_handed_over(client: RawClient) -> None:

@@ -1,0 +1,31 @@
+"""The page of who may do what agrees with the methods, and with the groups that give roles."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from daemon.api.methods import METHODS
+from daemon.api.parameters import Role
+from daemon.api.peers import Groups
+from vcan_tests.docs.pages import text_of
+
+ROW = re.compile(r"^\| \*(\w+)\* \| (.*) \| (.*) \|$", re.MULTILINE)
+SPAN = re.compile(r"`([^`]+)`")
+
+
+def rows() -> dict[str, tuple[str, list[str]]]:
+    """Who has each role, and its methods, as the page tells."""
+    found = ROW.findall(text_of("docs/rights.md"))
+    return {role: (who, SPAN.findall(methods)) for role, who, methods in found}
+
+
+@pytest.mark.parametrize("role", Role)
+def test_the_page_tells_each_method_in_the_row_of_its_least_role(role: Role) -> None:
+    assert sorted(rows()[role][1]) == sorted(name for name, method in METHODS.items() if method.role is role)
+
+
+@pytest.mark.parametrize("role", [Role.WATCH, Role.DRIVE, Role.CONFIGURE])
+def test_the_page_names_the_group_that_gives_a_role(role: Role) -> None:
+    assert f"group `{getattr(Groups(), role)}`" in rows()[role][0]
