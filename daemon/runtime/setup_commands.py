@@ -32,7 +32,7 @@ class SetupCommands:
         self._lowered: dict[tuple[EposDrive, ObjectDef], int] = {}
         self._writing = asyncio.Lock()
         supervisor.on_lease_end.append(self._on_lease_end)
-        supervisor.at_end.append(self._put_back)
+        supervisor.at_end.append(self._finish)
         self.handlers: dict[str, Handler] = {
             "setup.begin": self._begin,
             "setup.lower": self._lower,
@@ -76,21 +76,25 @@ class SetupCommands:
 
     async def _end(self, params: Params, lease: str | None) -> dict[str, Any]:
         self._require_holder(lease)
+        return {"trouble": await self._finish()}
+
+    async def _finish(self) -> list[str]:
+        """The setup is over, and nothing is lowered any more; what went wrong with that."""
         trouble = await self._put_back()
         self._supervisor.setup_lease = None
-        return {"trouble": trouble}
+        return trouble
 
     async def _put_back(self) -> list[str]:
         """Every limit as it was; a sentence for each that could not be written."""
         trouble = []
         async with self._writing:
-            while self._lowered:
-                (drive, limit), old = self._lowered.popitem()
+            for (drive, limit), old in list(self._lowered.items()):
                 try:
                     await drive.sdo.write(limit, old)
                 except CanhelmError as error:
                     trouble.append(f"{drive.name} keeps its lower {limit.name} until it is started anew: {error}")
                     self._supervisor.log.add("error", drive.name, trouble[-1], "switch it off and on")
+                del self._lowered[drive, limit]
         return trouble
 
     def _on_lease_end(self, lease: str) -> None:
@@ -111,7 +115,6 @@ class SetupCommands:
         except CanhelmError as error:
             supervisor.log.add("error", "supervisor", error.message, error.remedy or "")
         finally:
-            trouble = await self._put_back()
-            supervisor.setup_lease = None
+            trouble = await self._finish()
         told = "; ".join(trouble) or "the current limits are as before"
         supervisor.log.add("warning", "supervisor", f"the setup was broken off, its client is gone: {told}")

@@ -65,6 +65,29 @@ async def test_a_daemon_that_goes_down_meanwhile_puts_the_limits_back(tmp_path: 
         assert current_limits(shop) == limits
 
 
+async def test_once_the_daemon_has_gone_down_nothing_is_lowered_any_more(tmp_path: Path) -> None:
+    async with workshop(robot_file(tmp_path)) as shop:
+        await shop.call("setup.begin")
+        await shop.robot.app.supervisor.close()
+        with pytest.raises(Refused, match="this setup is over"):
+            await shop.call("setup.lower", node="rear_left", current_ma=500)
+
+
+async def test_limits_whose_return_is_cut_off_come_back_with_the_end(tmp_path: Path) -> None:
+    async with workshop(robot_file(tmp_path)) as shop:
+        limits = current_limits(shop)
+        await shop.call("setup.begin")
+        await shop.call("setup.lower", node="rear_left", current_ma=500)
+        await shop.call("simulation.fault", kind="lose", cob_id=0x602, times=1)
+        restoring = asyncio.create_task(shop.call("setup.restore"))
+        await asyncio.sleep(0.01)
+        restoring.cancel()
+        await asyncio.wait([restoring])
+        assert current_limits(shop) != limits
+        await shop.call("setup.end")
+        assert current_limits(shop) == limits
+
+
 class Interrupted:
     """A daemon and a person; Ctrl-C comes at a certain step, be it a question or a call that is under way.
 
