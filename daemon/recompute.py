@@ -10,6 +10,7 @@ import msgspec
 
 from canhelm.errors import ConfigError, UsageError
 from daemon.loops.measurement import Command, Measurement
+from daemon.runtime.cycle import LONGEST_STEP
 from daemon.runtime.motions import Motion
 from daemon.runtime.paired_steer_vehicle import PairedSteerVehicle
 from daemon.runtime.vehicle import VehicleState
@@ -22,8 +23,6 @@ from profiles.schema import Profile
 TOLERANCE_M_S = 1e-6
 METHODS = ("steer", "drive.parallel", "drive.turn")
 """Of paired steering: motions whose laws heed what was asked for at their begin, and then measurements alone."""
-LONGEST_STEP = 5
-"""Cycles; a later one is computed as if it were this late (:class:`daemon.runtime.cycle.Cycle`)."""
 
 
 @dataclass(slots=True)

@@ -12,6 +12,9 @@ from drivers.canopen.master import Master
 from drivers.contract import NodeState
 from drivers.devices import Devices
 
+LONGEST_STEP = 5
+"""Periods; a step that comes later is told that it were this late, so that no law leaps."""
+
 
 class Pace(Protocol):
     """What ticks once a cycle."""
@@ -136,7 +139,7 @@ class Cycle:
             self._deadline.cancel()
             self._deadline = None
         now = self._loop.time()
-        dt = self.period_s if self._last_step_s is None else min(now - self._last_step_s, 5 * self.period_s)
+        dt = self.period_s if self._last_step_s is None else min(now - self._last_step_s, LONGEST_STEP * self.period_s)
         self._last_step_s = now
         self._step(now, dt)
         counters = self.counters
