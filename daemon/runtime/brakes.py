@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 
-from canhelm.errors import CanhelmError, DeviceFault, Interlock
+from canhelm.errors import CanhelmError, DeviceFault, Interlock, Refused
 from daemon.runtime.tasks import TaskSet
 from drivers.contract import Brake, BrakeState, DriveState, NodeState
 from drivers.devices import Devices
 
+RELEASED = (BrakeState.RELEASING, BrakeState.RELEASED)
+ENGAGED = (BrakeState.ENGAGING, BrakeState.ENGAGED)
+
 
 class BrakeKeeper:
-    """Switches brakes; one that does not obey is a fault.
+    """Switches brakes; one that does not obey is a fault, but not one that was to open and engages for a stop.
 
     Args:
         devices: all devices.
@@ -38,9 +41,9 @@ class BrakeKeeper:
         for brake, wanted in zip(self._steering, release, strict=True):
             if self._devices.drives[brake.drive].node_state is not NodeState.READY:
                 continue
-            if wanted and brake.state not in (BrakeState.RELEASED, BrakeState.RELEASING):
+            if wanted and brake.state not in RELEASED:
                 self._tasks.spawn(self._switch(brake, brake.release), "brake")
-            elif not wanted and brake.state not in (BrakeState.ENGAGED, BrakeState.ENGAGING):
+            elif not wanted and brake.state not in ENGAGED:
                 self._tasks.spawn(self._switch(brake, brake.engage), "brake")
 
     def on_halt(self) -> None:
@@ -72,6 +75,8 @@ class BrakeKeeper:
         try:
             await switch()
         except CanhelmError as error:
+            if switch == brake.release and isinstance(error, Refused) and brake.state in ENGAGED:
+                return
             self._on_failure(
                 DeviceFault(
                     f"the {brake.name} brake did not switch: {error.message}", node=error.node, remedy=error.remedy

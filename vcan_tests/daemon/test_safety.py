@@ -115,6 +115,23 @@ async def test_a_stop_while_a_move_is_being_prepared_keeps_it_from_beginning(mom
         await robot.call("motor.disable", node=1)
 
 
+@pytest.mark.parametrize("moment_s", [0.01, 0.03, 0.05, 0.07, 0.09])
+@pytest.mark.parametrize("how", ["stop", "hang up"])
+async def test_a_stop_while_a_brake_opens_is_a_stop_and_no_fault(how: str, moment_s: float) -> None:
+    async with running_robot() as robot:
+        supervisor, brakes = robot.app.supervisor, robot.app.devices.brakes.values()
+        steering = asyncio.create_task(robot.call("steer", pair="front", angle_deg=20.0))
+        await robot.until(lambda: any(brake.state == "releasing" for brake in brakes))
+        await asyncio.sleep(moment_s)
+        if how == "stop":
+            await supervisor.stop("by a person")
+        else:
+            supervisor.close_lease(robot.lease or "")
+        with pytest.raises(Refused):
+            await steering
+        await robot.until(lambda: robot.state == "idle" and all(brake.state == "engaged" for brake in brakes), 5.0)
+
+
 async def test_an_emergency_stop_during_a_reset_stays_latched() -> None:
     async with running_robot(expect_errors=True) as robot:
         _twin(robot, 2).trigger_fault(0x4210)
