@@ -15,7 +15,7 @@ import asyncio
 import contextlib
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Final, TypeVar
 
 from canhelm.errors import BusOff, CanhelmError, NodeAbsent, NotReady, Refused, Timeout
@@ -197,6 +197,8 @@ class Brick:
         status: dict[str, Any] = {"name": self.name, "state": self.node_state, "sentence": self.status_sentence}
         status |= {"battery_v": self.battery_v, "battery_low": self.battery_low}
         status |= {"connections": self.connections, "losses": self.losses}
+        if self._line is not None:
+            status["line"] = asdict(self._line.counters)
         if self.info is not None and self.firmware is not None:
             version = f"{self.firmware.firmware_major}.{self.firmware.firmware_minor:02d}"
             status |= {"brick": self.info.name, "address": self.info.address, "firmware": version}

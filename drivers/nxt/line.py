@@ -51,6 +51,8 @@ class LineCounters:
     """Replies that nobody waited for."""
     refusals: int = 0
     """Replies with a status other than 0."""
+    dropped_bytes: int = 0
+    """Bytes in which no telegram could be found."""
 
 
 @dataclass(slots=True, eq=False)
@@ -85,11 +87,6 @@ class BrickLine:
         self._job: _Job | None = None
         self._timer: asyncio.TimerHandle | None = None
         port.host = self._receive
-
-    @property
-    def dropped_bytes(self) -> int:
-        """Bytes in which no telegram could be found."""
-        return self._unframer.dropped
 
     async def ask(self, content: Telegram) -> Telegram | None:
         """Send a request and wait for its reply.
@@ -148,6 +145,7 @@ class BrickLine:
                 self.counters.unexpected += 1
             else:
                 self._conclude(self._job, reply)
+        self.counters.dropped_bytes = self._unframer.dropped
 
     def _conclude(self, job: _Job, reply: Reply) -> None:
         self.counters.replies += 1

@@ -124,8 +124,3 @@ class Unframer:
                 found.append(bytes(buffer[2 : 2 + size]))
                 del buffer[: 2 + size]
         return found
-
-    def clear(self) -> None:
-        """Forget half a telegram, whose other half will not come any more."""
-        self.dropped += len(self._buffer)
-        self._buffer.clear()

@@ -63,6 +63,13 @@ async def test_a_brick_that_is_connected_says_who_it_is(bench: Bench) -> None:
     assert bench.told == ["Rover is connected, battery 8.0 V"]
 
 
+async def test_its_status_tells_what_went_over_the_line_and_what_was_dropped(bench: Bench) -> None:
+    assert bench.nxt.cable.host is not None
+    bench.nxt.cable.host(b"\x00\x00junk", 0.0)
+    line = bench.brick.status()["line"]
+    assert (line["sent"] >= line["replies"] > 0, line["bad_replies"], line["dropped_bytes"]) == (True, 0, 6)
+
+
 async def test_a_question_takes_two_turns_of_the_radio(bench: Bench) -> None:
     loop = asyncio.get_running_loop()
     began_s = loop.time()
@@ -147,7 +154,7 @@ async def test_what_nobody_asked_for_is_counted_and_dropped() -> None:
     for data in (make_frame(b"\x02\x0b\x00\x28\x23"), make_frame(b"\x00\x0b"), b"\x00\x00junk"):
         assert nxt.cable.host is not None
         nxt.cable.host(data, 0.0)
-    assert (line.counters.unexpected, line.counters.bad_replies, line.dropped_bytes) == (1, 1, 6)
+    assert (line.counters.unexpected, line.counters.bad_replies, line.counters.dropped_bytes) == (1, 1, 6)
     assert isinstance(await line.ask(requests.GetBatteryLevel()), replies.BatteryLevel)
 
 

@@ -198,14 +198,6 @@ def test_after_an_impossible_length_all_that_came_is_dropped(length: str) -> Non
     assert unframer.feed(make_frame(b"\x02\x0b\x00")) == [b"\x02\x0b\x00"]
 
 
-def test_half_a_telegram_can_be_forgotten() -> None:
-    unframer = Unframer()
-    unframer.feed(b"\x05\x00\x02")
-    unframer.clear()
-    assert unframer.dropped == 3
-    assert unframer.feed(make_frame(b"\x02\x0b\x00")) == [b"\x02\x0b\x00"]
-
-
 @pytest.mark.parametrize(
     "make",
     [
