@@ -96,8 +96,7 @@ def _greet(pad: PadInfo, mapping: Mapping) -> None:
     buttons, sticks = mapping.buttons, mapping.sticks
     wanted = {button for button in (buttons.dead_man, buttons.stop, buttons.emergency_stop) if button}
     require_parts(pad, {stick.axis for stick in sticks.values()}, wanted)
-    told = ", ".join(f"{stick.axis} {command}" for command, stick in sticks.items())
-    say(f"{pad.name}: {told}; {buttons.stop} stops, {buttons.emergency_stop} is the emergency stop")
+    say(f"{pad.name}: {mapping.legend()}")
     say(
         f"hold {buttons.dead_man} to drive; let go of it and the robot is at rest within {mapping.rest_s:.1f} s, "
         f"if the link to it is lost within {mapping.rest_s + LATE_S:.1f} s"

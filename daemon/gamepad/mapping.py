@@ -105,6 +105,13 @@ class Mapping:
             speed = min(math.hypot(speed, sideways), fastest)
         return {"speed_m_s": speed, **parameters}
 
+    def legend(self) -> str:
+        """What sticks and stop buttons do, for people."""
+        sticks = ", ".join(f"{stick.axis} {command}" for command, stick in self.sticks.items())
+        does = ((self.buttons.stop, "stops"), (self.buttons.emergency_stop, "is the emergency stop"))
+        stops = ", ".join(f"{button} {what}" for button, what in does if button)
+        return f"{sticks}; {stops or 'no button stops'}"
+
     def words(self, commands: Commands) -> str:
         """The commands for people."""
         return ", ".join(f"{command} {value:.2f} {self.sticks[command].unit}" for command, value in commands.items())

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from daemon.gamepad.mapping import Mapping, Stick
+from daemon.gamepad.mapping import Buttons, Mapping, Stick
 
 SHARES = st.floats(-1.0, 1.0)
 STICKS = st.builds(
@@ -140,3 +140,17 @@ def test_neutral_sticks_ask_for_nothing(x: float, y: float, turn: float) -> None
 
 def test_the_commands_are_told_with_their_units() -> None:
     assert mapping({"speed": stick("ABS_Y", 2.0)}).words({"speed": 0.5}) == "speed 0.50 m/s"
+
+
+@pytest.mark.parametrize(
+    ("stop", "emergency_stop", "told"),
+    [
+        ("BTN_SOUTH", "BTN_EAST", "BTN_SOUTH stops, BTN_EAST is the emergency stop"),
+        (None, "BTN_EAST", "BTN_EAST is the emergency stop"),
+        (None, None, "no button stops"),
+    ],
+)
+def test_the_legend_names_no_button_that_is_not_there(stop: str | None, emergency_stop: str | None, told: str) -> None:
+    robot = mapping({"speed": stick("ABS_Y", 2.0)})
+    robot.buttons = Buttons("BTN_TL", stop, emergency_stop)
+    assert robot.legend() == f"ABS_Y speed; {told}"
