@@ -86,12 +86,17 @@ async def commission(daemon: Daemon, person: Person, profile: Profile, what: str
         judge_encoders(pushes, profile.encoders, findings)
     finally:
         await to_its_end(_leave_safe(daemon))
+    _conclude(profile, what, findings)
+    return findings
+
+
+def _conclude(profile: Profile, what: str, findings: Findings) -> None:
+    """What all that was seen means together."""
     follow_swapped_wheels(profile, findings)
     if what != ALL and any(part == "drives" and keys[-1:] == ["node"] for part, *keys in findings.values):
         findings.unsolved.append("wheels are swapped: look at all of them, `canhelm setup all`")
     if what == ALL and not findings.unsolved:
         findings.values["setup",] = "done"
-    return findings
 
 
 def _holding(profile: Profile) -> dict[str, list[str]]:
