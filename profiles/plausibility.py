@@ -14,3 +14,5 @@ class PlausibilityConfig(Part, frozen=True, kw_only=True):
     """Between what an encoder and the wheels of its axis have turned, beyond 30 % of that; None: as much as a jump."""
     wheel_off_m: Positive | None = None
     """What wheels at rest may roll otherwise than any motion of the body; None: a cycle at `wheel_speed_m_s`."""
+    current_s: Positive | None = None
+    """For how long a motor's current may not fit the motion of its wheel; None: 0.25 s."""

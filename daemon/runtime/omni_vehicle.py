@@ -78,6 +78,11 @@ class OmniVehicle(Vehicle):
         self.senses.update(measurement, dt_s, powered=powered, standing=all(off) and slow)
         return measurement
 
+    @property
+    def pushing(self) -> bool:
+        """By its senses, where it has any that tell slip."""
+        return self.senses.pushing
+
     # --- motions -----------------------------------------------------------------------------------------------
 
     def motion(self, method: str, params: dict[str, Any], lease: str | None) -> Motion:

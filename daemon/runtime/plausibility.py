@@ -6,11 +6,12 @@ import math
 
 from canhelm.errors import DeviceFault
 from daemon.loops.measurement import Command, Measurement
+from daemon.loops.motor_current import CurrentAndMotion, Misfit, current_limits
 from daemon.loops.plausibility import AxisTurning, EncoderJumps, Turning
 from daemon.loops.plausibility_limits import encoder_rates_rad_s, jump_margins_rad, steered_axes, turning_limits_rad
 from daemon.loops.wheels_and_body import WheelsAndBody, rows_of, wheel_limit_m, wheels_of
 from daemon.runtime.vehicle import Vehicle
-from drivers.contract import Device, Fault
+from drivers.contract import Device, Drive, Fault
 
 _TURNS = {
     Turning.STANDS: "stands while its wheels turn its axis",
@@ -28,6 +29,10 @@ _JUMP_REMEDY = (
 )
 
 _WHEEL_REMEDY = "is the wheel blocked, does it slip, or is its belt off? else check the motor's encoder and cable"
+_MISFIT_REMEDIES = {
+    Misfit.IN_VAIN: "is its wheel, gear or brake blocked, or does it push something? else check the motor's encoder",
+    Misfit.NONE: "check the motor's cable and plugs; is its shaft or belt loose?",
+}
 
 
 class Plausibility:
@@ -45,8 +50,13 @@ class Plausibility:
         self._jumps = EncoderJumps(rates_rad_s, jump_margins_rad(profile, names), 1.0 / profile.network.cycle_hz)
         limits_rad = turning_limits_rad(profile, names)
         self._axes = tuple((axis, AxisTurning(limits_rad[axis.encoder])) for axis in steered_axes(profile))
-        self._profile, self._drives = profile, vehicle.drives
+        self._vehicle, self._profile, self._drives = vehicle, profile, vehicle.drives
         self._body = WheelsAndBody(wheel_limit_m(profile))
+        self._currents = tuple(
+            (index, config.direction, CurrentAndMotion(current_limits(profile, config)))
+            for index, drive in enumerate(vehicle.drives)
+            if (config := profile.drives.get(drive.name))
+        )
 
     def look(
         self, measurement: Measurement, command: Command, dt_s: float, *, powered: bool, driving: bool
@@ -68,7 +78,11 @@ class Plausibility:
         if jump:
             return self._off(jump.index, "jumped", jump.value, jump.limit, _JUMP_REMEDY)
         driving = powered and driving
-        return self._turned(measurement, command, dt_s, driving) or self._rolled(measurement, command, dt_s, driving)
+        return (
+            self._turned(measurement, command, dt_s, driving)
+            or self._rolled(measurement, command, dt_s, driving)
+            or self._pulled(measurement, command, dt_s, driving)
+        )
 
     def _turned(self, measurement: Measurement, command: Command, dt_s: float, driving: bool) -> DeviceFault | None:
         """The first axis that turns otherwise than its wheels turn it."""
@@ -102,12 +116,34 @@ class Plausibility:
         told = f"node {drive.node} ({drive.name}) rolls otherwise than the body moves: the wheels are off by {off:g} m"
         return _fault(drive, f"{told}, at most {limit:g} m can be true", off, limit, _WHEEL_REMEDY)
 
+    def _pulled(self, measurement: Measurement, command: Command, dt_s: float, driving: bool) -> DeviceFault | None:
+        """The first motor whose current does not fit the motion of its wheel; a robot that pushes something is let."""
+        for index, direction, check in self._currents:
+            if not driving or self._vehicle.pushing:
+                check.begin_anew()
+                continue
+            drive = self._drives[index]
+            speed_m_s, commanded_m_s = measurement.wheel_speed_m_s[index], command.wheel_speed_m_s[index]
+            misfit = check.look(direction * drive.current_a, speed_m_s, commanded_m_s, dt_s)
+            if misfit:
+                return _misfit(drive, misfit, check, f"{round(speed_m_s, 2) + 0.0:.2f} m/s of {commanded_m_s:.2f} m/s")
+        return None
+
     def _off(self, index: int, does: str, off_rad: float, limit_rad: float, remedy: str) -> DeviceFault:
         """A fault of an encoder that is off by an angle."""
         encoder = self._encoders[index]
         value, limit = round(math.degrees(off_rad), 2), round(math.degrees(limit_rad), 2)
         told = f"the encoder of node {encoder.node} ({encoder.name}) {does}: off by {value:g} deg"
         return _fault(encoder, f"{told}, at most {limit:g} deg can be true", value, limit, remedy)
+
+
+def _misfit(drive: Drive, how: Misfit, check: CurrentAndMotion, rim: str) -> DeviceFault:
+    """A fault of a motor; ``rim`` is what its wheel does of what it shall do."""
+    in_vain, current_a = how is Misfit.IN_VAIN, round(abs(drive.current_a), 2)
+    limit_a = round(check.limits.strong_a if in_vain else check.limits.weak_a, 3)
+    does = f"has {current_a:g} A in vain" if in_vain else f"moves without current ({current_a:g} A)"
+    told = f"the motor of node {drive.node} ({drive.name}) {does}: its wheel turns at {rim}"
+    return _fault(drive, told, current_a, limit_a, _MISFIT_REMEDIES[how])
 
 
 def _fault(device: Device, told: str, value: float, limit: float, remedy: str) -> DeviceFault:

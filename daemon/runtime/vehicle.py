@@ -139,6 +139,11 @@ class Vehicle(ABC):
     def observe(self, measurement: Measurement) -> None:
         """Told of every cycle's measurement (odometry)."""
 
+    @property
+    def pushing(self) -> bool:
+        """Whether it knows that something holds it which it may push: much current is not in vain then."""
+        return False
+
     def require_free(self, motion: Motion) -> None:
         """Raise Interlock where a brake stands against the motion, NotReady where a device that it needs is away."""
 

@@ -285,6 +285,11 @@ def _motor_blocked(site: Site, fault: Fault, _: Random) -> Effect:
     return Effect(lambda: world.block(name, True), lambda: world.block(name, False))
 
 
+def _motor_open(site: Site, fault: Fault, _: Random) -> Effect:
+    motion = site.network.drives[fault.part or ""].motion
+    return Effect(lambda: setattr(motion, "cable_off", True), lambda: setattr(motion, "cable_off", False))
+
+
 # The way to the daemon
 
 
@@ -336,6 +341,7 @@ MAKERS: dict[str, Maker] = {
     **dict.fromkeys(("brake_slips", "brake_stuck"), _brake_fault),
     "ice": _ice,
     "motor_blocked": _motor_blocked,
+    "motor_open": _motor_open,
     **dict.fromkeys(("bus_off", "unplugged"), _adapter_fault),
     "serial_noise": _serial_noise,
     "brick_lost": _brick_lost,

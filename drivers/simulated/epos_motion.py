@@ -93,6 +93,7 @@ class Motion:
         homing: the law of mode 6, set by who builds both.
         demand_speed: speed demand [rad/s], from ramp or position regulator.
         powered: the power stage is on.
+        cable_off: the motor is not connected: no current flows.
         halted: the halt bit is set.
         acknowledged: the last set-point of mode 1 was taken.
     """
@@ -111,7 +112,7 @@ class Motion:
         self.qc_per_rad = config.qc_per_motor_turn / (2.0 * pi)
         self.mode = Mode.PROFILE_POSITION
         self.demand_speed = 0.0
-        self.powered = self.halted = self.acknowledged = self.following_error = False
+        self.powered = self.halted = self.acknowledged = self.following_error = self.cable_off = False
         self._raise_fault = raise_fault
         self._ramp_ended = ramp_ended
         self._stopping = self._set_point_bit = False
@@ -266,7 +267,7 @@ class Motion:
     def current_demand(self, speed_rad_s: float, position_rad: float, dt_s: float) -> float:
         """Demand of motor current [A] for the coming step."""
         current = self._law(speed_rad_s, position_rad, dt_s)
-        return current if self.powered else 0.0
+        return current if self.powered and not self.cable_off else 0.0
 
     def _follow_ramp(self, speed: float, _position: float, dt_s: float) -> float:
         ramp = self.ramp

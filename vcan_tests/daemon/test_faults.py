@@ -202,8 +202,8 @@ async def test_a_brake_that_does_not_open_keeps_its_pair_where_it_is() -> None:
     async with running_robot(expect_errors=True) as robot:
         answer, heading_deg = await _steered(robot, {"kind": "brake_stuck", "part": "front"})
         assert isinstance(answer, DeviceFault)
-        assert "front: the pair does not turn" in answer.message
-        assert "brake" in answer.message
+        assert "(front_left) has 5 A in vain" in answer.message
+        assert "brake" in (answer.remedy or "")
         assert heading_deg == pytest.approx(0.0, abs=0.1)
 
 

@@ -9,8 +9,9 @@ import msgspec
 import pytest
 
 from canhelm.errors import DeviceFault
-from daemon import demo_ackermann, demo_max2d_path, demo_semitrailer
+from daemon import demo_ackermann, demo_max2d_path, demo_semitrailer, demo_turtle
 from daemon.demo import FIGURES, Demo
+from daemon.loops.motor_current import TIME_S
 from daemon.loops.plausibility import AxisTurning, EncoderJumps, SteeredBy, Turning
 from daemon.loops.plausibility_limits import encoder_rates_rad_s, jump_margins_rad, steered_axes, turning_limits_rad
 from daemon.loops.wheels_and_body import wheel_limit_m
@@ -246,10 +247,13 @@ def halved(name: str) -> Profile:
     profile = load(name).profile
     encoders = tuple(profile.encoders)[: len(encoder_rates_rad_s(profile))]
     off_deg, jump_deg = (
-        0.5 * math.degrees(min(limits(profile, encoders))) for limits in (turning_limits_rad, jump_margins_rad)
+        0.5 * math.degrees(min(limits(profile, encoders), default=math.radians(1.0)))
+        for limits in (turning_limits_rad, jump_margins_rad)
     )
     wheel_m = 0.5 * wheel_limit_m(profile)
-    config = PlausibilityConfig(encoder_jump_deg=jump_deg, encoder_off_deg=off_deg, wheel_off_m=wheel_m)
+    config = PlausibilityConfig(
+        encoder_jump_deg=jump_deg, encoder_off_deg=off_deg, wheel_off_m=wheel_m, current_s=0.5 * TIME_S
+    )
     return msgspec.structs.replace(profile, plausibility=config)
 
 
@@ -270,6 +274,12 @@ def test_the_car_drives_its_steps_in_peace_with_half_the_limits(step: demo_acker
 @pytest.mark.parametrize("figure", demo_semitrailer.figures(), ids=lambda figure: str(figure.identity))
 def test_the_semitrailer_follows_its_paths_in_peace_with_half_the_limits(figure: demo_semitrailer.Manoeuvre) -> None:
     result = run_virtual(demo_semitrailer.drive(halved("semitrailer"), figure, 5, None, lambda _: None))
+    assert result.numbers["achieved"]
+
+
+@pytest.mark.parametrize("figure", demo_turtle.FIGURES, ids=lambda figure: str(figure.identity))
+def test_the_turtle_drives_its_figures_in_peace_with_half_the_limits(figure: demo_turtle.TurtleFigure) -> None:
+    result = run_virtual(demo_turtle.drive(halved("turtle"), figure, 5, None, lambda _: None))
     assert result.numbers["achieved"]
 
 
