@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from canhelm import __version__, errors, protocol
 from canhelm.errors import CanhelmError, Refused, UsageError
+from daemon.api.metering import BYTES_PER_S, REQUESTS_PER_S, Meter
 from daemon.api.methods import METHODS, NOTIFICATIONS
 from daemon.api.parameters import Method, validate
 from daemon.api.peers import Peer
@@ -57,6 +58,7 @@ class Connection(asyncio.Protocol):
         self._received = bytearray()
         self._handling = False
         self._malformed = 0
+        self._meter = Meter(self._heard_s)
         self._lease: str | None = None
         self._pending: set[asyncio.Task[None]] = set()
         self._moving: set[asyncio.Task[None]] = set()
@@ -140,12 +142,23 @@ class Connection(asyncio.Protocol):
                 self._wait_for_more()
                 return
             line = bytes(self._received[:end])
+            message = protocol.parse_message(line)
+            wait_s = 0.0 if _stops(message) else self._meter.wait_s(end, asyncio.get_running_loop().time())
+            if wait_s and len(self._received) == end + 1:  # it waits for its answers: this one comes later
+                self._go_on_later(wait_s)
+                return
             del self._received[: end + 1]
-            self._handle_line(line)
+            if wait_s:
+                self._meter.refuse(end)
+            if line.strip():
+                self._handle_message(message, too_many=wait_s > 0.0)
+        self._go_on_later(self._meter.pause_s())
+
+    def _go_on_later(self, pause_s: float) -> None:
         if self._transport is not None:
             self._handling = True
             self._transport.pause_reading()
-            asyncio.get_running_loop().call_soon(self._handle_lines)
+            asyncio.get_running_loop().call_later(pause_s, self._handle_lines)
 
     def _wait_for_more(self) -> None:
         if self._transport is None or self._transport.is_closing():
@@ -165,10 +178,7 @@ class Connection(asyncio.Protocol):
 
     # -- requests -----------------------------------------------------------------------------------------------------
 
-    def _handle_line(self, line: bytes) -> None:
-        if not line.strip():
-            return
-        message = protocol.parse_message(line)
+    def _handle_message(self, message: dict[str, Any] | str, *, too_many: bool) -> None:
         if isinstance(message, str):
             code = protocol.PARSE_ERROR if message.startswith("not JSON:") else protocol.INVALID_REQUEST
             self._malformed_line(None, message, code)
@@ -180,6 +190,8 @@ class Connection(asyncio.Protocol):
             self._malformed_line(request_id, "method is missing or no string")
         elif not isinstance(message.get("params", {}), dict):
             self._malformed_line(request_id, "params is no object")
+        elif too_many:
+            self._refuse_flood(request_id)
         else:
             self._server.counters.requests += 1
             self._begin(request_id, message["method"], message.get("params", {}), "id" in message)
@@ -191,6 +203,12 @@ class Connection(asyncio.Protocol):
         self._answer(request_id, code, UsageError(reason, remedy=remedy))
         if self._malformed >= MAX_MALFORMED:
             self._drop("it sends nonsense")
+
+    def _refuse_flood(self, request_id: int | str | None) -> None:
+        self._server.counters.refused += 1
+        limit = f"{REQUESTS_PER_S} requests or {BYTES_PER_S} bytes a second"
+        refusal = Refused(f"too many at once: more than {limit}", limit=limit, remedy="wait for answers")
+        self._answer(request_id, refusal.rpc_code, refusal)
 
     def _begin(self, request_id: int | str | None, name: str, params: dict[str, Any], answer: bool) -> None:
         try:
@@ -352,3 +370,9 @@ class Connection(asyncio.Protocol):
         if now - self._slow_since > STALLED_S:
             self._drop("it stopped reading")
         return True
+
+
+def _stops(message: dict[str, Any] | str) -> bool:
+    """Whether a message asks for a method that stops the robot."""
+    name = message.get("method") if isinstance(message, dict) else None
+    return isinstance(name, str) and name in METHODS and METHODS[name].urgent

@@ -24,6 +24,8 @@ REQUIRED = object()
 """Default of a parameter that has none."""
 MAX_SETTINGS = 1000
 """Settings in one request."""
+MAX_NESTING = 8
+"""Objects and lists within each other in one parameter; a path has four."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,6 +192,13 @@ def _is_settings(value: Any) -> bool:
     return isinstance(value, dict) and len(value) <= MAX_SETTINGS and all(map(_is_integer, value.values()))
 
 
+def _is_shallow(value: Any, depth: int = MAX_NESTING) -> bool:
+    if not isinstance(value, dict | list):
+        return True
+    items = value.values() if isinstance(value, dict) else value
+    return depth > 0 and all(_is_shallow(item, depth - 1) for item in items)
+
+
 def _is_node(value: Any) -> bool:
     return 1 <= value <= 127 if _is_integer(value) else _is_text(value)
 
@@ -202,6 +211,6 @@ _TYPES: dict[str, tuple[Callable[[Any], bool], str]] = {
     "node": (_is_node, "a node id from 1 to 127, or a name"),
     "values": (_is_settings, f"at most {MAX_SETTINGS} whole numbers by object"),
     "value": (lambda value: _is_number(value) or _is_text(value), "a number or a string"),
-    "object": (lambda value: isinstance(value, dict), "an object"),
-    "list": (lambda value: isinstance(value, list), "a list"),
+    "object": (lambda value: isinstance(value, dict) and _is_shallow(value), f"an object, {MAX_NESTING} deep at most"),
+    "list": (lambda value: isinstance(value, list) and _is_shallow(value), f"a list, {MAX_NESTING} deep at most"),
 }

@@ -88,6 +88,7 @@ class Counters:
         clients: connected now.
         requests: lines that were requests.
         malformed: lines that were not.
+        refused: requests of clients that sent too many at once.
         lost_samples: status samples and events not sent to clients that read too slowly.
         dropped_clients: connections ended because of what the client did or did not do.
         internal_errors: requests that failed by a defect of the daemon (each is logged with its traceback).
@@ -96,6 +97,7 @@ class Counters:
     clients: int = 0
     requests: int = 0
     malformed: int = 0
+    refused: int = 0
     lost_samples: int = 0
     dropped_clients: int = 0
     internal_errors: int = 0

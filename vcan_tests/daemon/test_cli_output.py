@@ -12,7 +12,7 @@ from rich.console import Console
 
 from canhelm.errors import LimitExceeded
 from daemon.cli.motion import cut, progress_text
-from daemon.cli.output import plain, say_error, show, words
+from daemon.cli.output import plain, say, say_error, show, words
 from daemon.cli.sdo import value_of
 from daemon.cli.status import table
 
@@ -43,7 +43,8 @@ def drawn(status: dict[str, Any], width: int = 120) -> str:
 
 @pytest.mark.parametrize(
     "told",
-    ["max2d  fault  node 3 (front_left) was lost  (your role: drive)", "held by alice (pid 77: canhelm drive joystick)\n",
+    ["max2d  fault  node 3 (front_left) was lost  (your role: drive)",
+     "held by alice (pid 77: canhelm drive joystick)\n",
      "-250", "no boot-up; is motor power on?",
      "position error - check the encoder", "rear engaged", "bus: load 0.12\n", "bus trouble: unknown 4\n",
      "front_left: lost - power?"],
@@ -155,3 +156,8 @@ def test_a_list_of_objects_has_a_line_each_for_people(capsys: pytest.CaptureFixt
         "  0: kind line, length_m 0.5",
         "  1: kind arc, length_m 1",
     ]
+
+
+def test_a_message_gives_no_orders_to_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    say("key '\x1b[2J\x9bm' stands\there\ntwice")
+    assert capsys.readouterr().err == "canhelm: key '\ufffd[2J\ufffdm' stands\there\ntwice\n"

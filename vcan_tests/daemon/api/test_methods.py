@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from canhelm.errors import UsageError
 from daemon.api.methods import METHODS
-from daemon.api.parameters import validate
+from daemon.api.parameters import MAX_NESTING, validate
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
@@ -51,6 +51,18 @@ def test_a_value_out_of_range_is_refused_with_the_range() -> None:
 def test_a_range_without_an_upper_end_is_told_by_its_lower_one() -> None:
     error = refusal("drive.path", path={}, speed_m_s=-1)
     assert (error.limit, error.remedy) == ("at least 0.001 m/s", "give at least 0.001 m/s")
+
+
+@pytest.mark.parametrize(("depth", "fits"), [(1, True), (MAX_NESTING, True), (MAX_NESTING + 1, False), (900, False)])
+def test_lists_in_lists_are_taken_to_a_depth_that_is_told(depth: int, fits: bool) -> None:
+    pieces: list[Any] = []
+    for _ in range(depth - 1):
+        pieces = [pieces]
+    if fits:
+        assert validate(METHODS["path.add"], {"pieces": pieces})["pieces"] == pieces
+        return
+    with pytest.raises(UsageError, match=f"is not a list, {MAX_NESTING} deep at most"):
+        validate(METHODS["path.add"], {"pieces": pieces})
 
 
 def test_an_unknown_parameter_is_refused_with_those_that_there_are() -> None:
