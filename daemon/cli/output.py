@@ -28,6 +28,10 @@ Json = Annotated[
 """Type of every command's ``json`` parameter: ``json: Json = None``."""
 
 
+_SHOWN = dict.fromkeys((*range(9), *range(11, 32), *range(127, 160)), "\N{REPLACEMENT CHARACTER}")
+"""Control characters of a file or a device, but for tabs and line ends: no orders to a person's terminal."""
+
+
 def wants_json(flag: bool | None) -> bool:
     """Whether to write JSON: as told, else when stdout is no terminal."""
     return flag if flag is not None else not sys.stdout.isatty()
@@ -102,7 +106,7 @@ def say(text: str, level: int = journal.INFO) -> None:
         text: the sentence.
         level: how the journal shall take it, where stderr goes there.
     """
-    told = f"canhelm: {text}"
+    told = f"canhelm: {text.translate(_SHOWN)}"
     if journal.reads_stderr(os.environ):
         told = journal.with_level(told, level)
     print(told, file=sys.stderr, flush=True)
