@@ -7,14 +7,13 @@ begins nothing is said as a rule: where the one before it ends. The same structu
 from __future__ import annotations
 
 import gc
-import math
 import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Literal, TypeVar
 
 import msgspec
 import yaml
@@ -22,13 +21,12 @@ from msgspec import Meta
 
 from canhelm.errors import CanhelmError, UsageError
 from profiles.parts import Part, Positive
+from profiles.path_text import PathText
 
 SHIPPED = Path(__file__).resolve().parent / "paths"
 MAX_PIECES = 200_000
 MAX_FILE_BYTES = 20_000_000
 MAX_WAYPOINTS = 500
-_MAX_DEPTH = 6
-_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _PIECE = re.compile(r"pieces\[(\d+)\]")
 _EXPECTED = re.compile(r"Expected `(\w+)(?: \| null)?`([^`]*?)(?:, got `.*`)?")
 _KINDS = {"float": "a finite number", "array": "a list", "object": "a mapping", "str": "a text"}
@@ -125,25 +123,17 @@ def load_path_file(name_or_path: str | Path) -> PathFile:
     """
     file = find_path_file(name_or_path)
     with _no_collection():
-        root = _composed(file)
-        lines = _piece_lines(root)
+        text = _read(file)
         try:
-            data = _plain(root, 0)
-        except RecursionError:
-            raise _mistake(file, 1, "is nested too deeply", "give a mapping with a list of pieces") from None
-        except yaml.MarkedYAMLError as error:
-            line = error.problem_mark.line + 1 if error.problem_mark else 1
-            raise _mistake(file, line, str(error.problem), "remove one of them") from None
-        try:
-            spec = msgspec.convert(data, PathSpec)
+            spec = msgspec.convert(text.value, PathSpec)
         except msgspec.ValidationError as error:
             where, what, remedy = mistake_of(error)
             piece = _PIECE.search(where)
-            line = lines[int(piece[1])] if piece and int(piece[1]) < len(lines) else 1
+            line = text.lines[int(piece[1])] if piece and int(piece[1]) < len(text.lines) else 1
             raise _mistake(file, line, f"{where or 'the file'}: {what}", remedy) from None
     if not spec.pieces:
         raise _mistake(file, 1, "the path is empty", "give it at least one line or arc under pieces:")
-    return PathFile(file, spec, lines)
+    return PathFile(file, spec, text.lines)
 
 
 def mistake_of(error: msgspec.ValidationError) -> tuple[str, str, str]:
@@ -174,60 +164,24 @@ def _mistake(file: Path, line: int, what: str, remedy: str) -> UsageError:
     return UsageError(f"{file}:{line}: {what}", value=str(file), remedy=remedy)
 
 
-def _composed(file: Path) -> yaml.Node:
+def _read(file: Path) -> PathText:
+    """The values in a file, a mapping. Raises UsageError."""
     try:
         if file.stat().st_size > MAX_FILE_BYTES:
             raise _mistake(file, 1, f"is larger than {MAX_FILE_BYTES / 1e6:g} MB", "drive it in parts")
-        root: yaml.Node | None = yaml.compose(file.read_text("utf-8-sig"), Loader=_LOADER)
+        text = PathText(file.read_text("utf-8-sig"))
     except OSError as error:
         raise _mistake(file, 1, f"cannot be read ({error.strerror})", "check its permissions") from None
     except UnicodeDecodeError:
         raise _mistake(file, 1, "is not UTF-8 text", "save the file as UTF-8") from None
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        what = f"YAML: {error.problem or error.context}"
-        raise _mistake(file, mark.line + 1 if mark else 1, what, "mend the syntax") from None
+        what = error.problem if error.note else f"YAML: {error.problem or error.context}"
+        raise _mistake(file, mark.line + 1 if mark else 1, str(what), error.note or "mend the syntax") from None
     except yaml.YAMLError:
         raise _mistake(file, 1, "YAML: it has a character that is not allowed", "remove it") from None
-    if isinstance(root, yaml.SequenceNode) and root.value:
+    if isinstance(text.value, list) and text.value:
         raise _mistake(file, 1, "is a list, not a mapping", "write pieces: above it, and indent it")
-    if not isinstance(root, yaml.MappingNode):
+    if not isinstance(text.value, dict):
         raise _mistake(file, 1, "the path is empty", "give it at least one line or arc under pieces:")
-    return root
-
-
-def _piece_lines(root: yaml.Node) -> list[int]:
-    """Line of each piece, from 1."""
-    for key, value in root.value:
-        if key.value == "pieces" and isinstance(value, yaml.SequenceNode):
-            return [item.start_mark.line + 1 for item in value.value]
-    return []
-
-
-def _plain(node: yaml.Node, depth: int) -> Any:
-    """The value of a node; a plain scalar that is a finite number is one, everything else is text."""
-    if depth > _MAX_DEPTH:
-        raise RecursionError
-    if isinstance(node, yaml.MappingNode):
-        return _mapping(node, depth)
-    if isinstance(node, yaml.SequenceNode):
-        return [_plain(item, depth + 1) for item in node.value]
-    if isinstance(node, yaml.ScalarNode) and not node.style:
-        try:
-            number = float(node.value)
-        except ValueError:
-            return node.value
-        return number if math.isfinite(number) else node.value
-    return node.value
-
-
-def _mapping(node: yaml.MappingNode, depth: int) -> dict[str, Any]:
-    """Raises yaml.MarkedYAMLError where a key stands twice."""
-    found: dict[str, Any] = {}
-    for key, value in node.value:
-        if not isinstance(key, yaml.ScalarNode):
-            continue
-        if key.value in found:
-            raise yaml.MarkedYAMLError(problem=f"key '{key.value}' stands here twice", problem_mark=key.start_mark)
-        found[key.value] = _plain(value, depth + 1)
-    return found
+    return text

@@ -102,6 +102,21 @@ def test_broken_yaml_is_a_mistake_like_others(tmp_path: Path, text: str) -> None
     assert refusal(tmp_path, text)[0].isdigit()
 
 
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("a: &a [1]\npieces:\n  - *a\n", "3: aliases are not supported"),
+        ("pieces: []\n---\npieces: []\n", "2: a second document begins"),
+        ("? [1]\n: 2\npieces: []\n", "1: a key is not a text"),
+        ("pieces:\n  " + "[" * 200_000, "2: is nested too deeply"),
+        ("pieces:\n  " + "- " * 200_000, "2: is nested too deeply"),
+    ],
+    ids=("alias", "second document", "key", "brackets", "dashes"),
+)
+def test_what_a_path_has_no_need_of_is_refused_before_it_takes_memory(tmp_path: Path, text: str, told: str) -> None:
+    assert refusal(tmp_path, text).startswith(told)
+
+
 def test_a_file_that_is_not_there_is_told_with_those_that_are_shipped() -> None:
     with pytest.raises(UsageError, match="park-parallel"):
         load_path_file("nowhere")
