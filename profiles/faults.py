@@ -16,7 +16,7 @@ from msgspec import Meta
 
 from canhelm.errors import UsageError
 from profiles.parts import NotNegative, Part, Positive
-from profiles.provenance import Mapping, Mistake, Node, Reader, place_of
+from profiles.provenance import Mapping, Mistake, Node, Reader, listed, place_of
 from profiles.schema import Profile
 from profiles.shape import Shape
 
@@ -245,6 +245,5 @@ def _located(tree: Node, index: int, found: Iterator[Objection]) -> Iterator[Mis
 
 
 def _mistaken(file: Path, mistakes: list[Mistake]) -> UsageError:
-    lines = [f"{file} has {len(mistakes)} mistake{'s' if len(mistakes) > 1 else ''}:", *(f"  {m}" for m in mistakes)]
     remedy = "docs/faults.md has the kinds of faults and their keys"
-    return UsageError("\n".join(lines), value=str(file), remedy=remedy)
+    return UsageError(listed(str(file), mistakes), value=str(file), remedy=remedy)

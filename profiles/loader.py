@@ -13,7 +13,7 @@ import msgspec
 
 from canhelm.errors import ConfigError
 from profiles import catalogue, checks, feasibility, own_class
-from profiles.provenance import Listing, Mapping, Mistake, Node, Place, Reader, Scalar, leaves, merge
+from profiles.provenance import Listing, Mapping, Mistake, Node, Place, Reader, Scalar, leaves, listed, merge
 from profiles.schema import Profile
 from profiles.shape import Shape
 
@@ -29,8 +29,7 @@ class ProfileError(ConfigError):
     """A profile with mistakes; the message lists them line by line, each with file:line and what to do."""
 
     def __init__(self, name: str, mistakes: Sequence[Mistake]) -> None:
-        count = f"{len(mistakes)} mistake{'s' if len(mistakes) > 1 else ''}"
-        super().__init__("\n".join([f"profile {name} has {count}:", *(f"  {mistake}" for mistake in mistakes)]))
+        super().__init__(listed(f"profile {name}", mistakes))
         self.mistakes = tuple(mistakes)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -17,8 +17,9 @@ import yaml
 
 ASSUMED = "!assumed"
 """Tag of a value that no source gives."""
-MAX_FILE_BYTES = 1_000_000
+MAX_FILE_BYTES = 200_000
 MAX_DEPTH = 30
+MOST_LISTED = 100
 LARGEST_INTEGER = 2**63 - 1
 NO_ALIASES = "aliases are not supported"
 
@@ -55,6 +56,13 @@ class Mistake:
 
     def __str__(self) -> str:
         return f"{self.place}: {self.field + ': ' if self.field else ''}{self.what}; {self.remedy}"
+
+
+def listed(subject: str, mistakes: Sequence[Mistake]) -> str:
+    """What has mistakes, and these line by line; of very many the first."""
+    count = f"{len(mistakes)} mistake{'s' if len(mistakes) > 1 else ''}"
+    lines = [f"{subject} has {count}:", *(f"  {mistake}" for mistake in mistakes[:MOST_LISTED])]
+    return "\n".join(lines if len(mistakes) <= MOST_LISTED else [*lines, "  ..."])
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,7 +203,7 @@ class Reader:
     def _text(self) -> str | None:
         try:
             if self.path.stat().st_size > MAX_FILE_BYTES:
-                self._wrong(1, "is larger than 1 MB", "give a profile")
+                self._wrong(1, f"is larger than {MAX_FILE_BYTES // 1000} kB", "give a profile")
                 return None
             content = self.path.read_bytes()
             return content.decode("utf-8-sig")
@@ -258,7 +266,7 @@ class Reader:
         except ValueError:
             octal = re.match(r"[-+]?0[0-9]", text)
             remedy = "write it without the zero in front" if octal else "write a number of ordinary size"
-            self._wrong(line, f"{_short(text)} is no {kind}", remedy)
+            self._wrong(line, f"{short(text)} is no {kind}", remedy)
             return None
 
 
@@ -315,5 +323,6 @@ _CONVERT: dict[str, Callable[[str], Value]] = {
 }
 
 
-def _short(text: str) -> str:
+def short(text: str) -> str:
+    """A text of a file in quotes, its end left out where it is long."""
     return repr(text if len(text) <= 40 else text[:37] + "...")

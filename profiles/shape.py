@@ -10,7 +10,7 @@ from typing import Any
 from msgspec import inspect
 
 from profiles.own_vehicle import CLASS_PATTERN
-from profiles.provenance import FieldPath, Listing, Mapping, Mistake, Node, Place, Scalar, dotted, plain
+from profiles.provenance import FieldPath, Listing, Mapping, Mistake, Node, Place, Scalar, dotted, plain, short
 
 _NUMBERS = {inspect.IntType: "a whole number", inspect.FloatType: "a number"}
 
@@ -105,7 +105,7 @@ def shown(node: Node) -> str:
         return f"a list of {len(node.items)}"
     if isinstance(node.value, bool):
         return str(node.value).lower()
-    return "empty" if node.value is None else repr(node.value)
+    return "empty" if node.value is None else short(node.value) if isinstance(node.value, str) else repr(node.value)
 
 
 def expected(kind: inspect.Type) -> str:

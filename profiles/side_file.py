@@ -60,7 +60,9 @@ def write_values(profile: Path, values: Mapping[tuple[str, ...], Any]) -> Path:
     except OSError as error:
         remedy = "use a profile of your own: `canhelm profile new` makes one"
         raise ConfigError(f"cannot write {side}: {error.strerror}", value=str(side), remedy=remedy) from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except RecursionError:
+        raise ConfigError(f"{side} is nested too deeply", value=str(side), remedy="mend or remove it") from None
+    except (yaml.YAMLError, ValueError) as error:
         raise ConfigError(f"cannot read {side}: {error}", value=str(side), remedy="mend or remove it") from None
     return side
 

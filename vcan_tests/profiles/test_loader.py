@@ -179,6 +179,18 @@ def test_extends_wants_a_name(mistakes: Mistakes, text: str) -> None:
     assert mistakes(f"network: {{extends: {text}}}")[0].startswith("lab.yaml:4: extends: is not a name")
 
 
+def test_of_very_many_mistakes_the_first_hundred_are_told(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_text("extends: max2d\n" + "".join(f"key{number}: 1\n" for number in range(500)))
+    with pytest.raises(ProfileError) as caught:
+        load(tmp_path / "a.yaml")
+    told = str(caught.value).splitlines()
+    assert (told[0], len(told), told[-1]) == (f"profile {tmp_path}/a.yaml has 500 mistakes:", 102, "  ...")
+
+
+def test_a_long_value_is_told_by_its_beginning(mistakes: Mistakes) -> None:
+    assert mistakes(f"network: {'a' * 5000}")[0].startswith(f"lab.yaml:4: network: is '{'a' * 37}...'; write")
+
+
 def test_a_file_that_is_no_mapping_is_a_mistake(tmp_path: Path) -> None:
     (tmp_path / "a.yaml").write_text("# robots\n- max2d\n")
     with pytest.raises(ProfileError, match=r"a\.yaml:2: is not a mapping"):

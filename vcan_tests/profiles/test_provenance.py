@@ -66,7 +66,7 @@ def test_numbers_out_of_this_world_are_mistakes(tmp_path: Path, text: str) -> No
         ("a: 1\nb: \x07\n", "a.yaml:2: character U+0007 is not allowed"),
         ("a: " + "[" * 200 + "\n", "a.yaml:1: YAML: nested too deeply"),
         (b"a: 1\nb: \xff\n", "a.yaml:2: is not UTF-8 text"),
-        (b"#" * (MAX_FILE_BYTES + 1), "a.yaml:1: is larger than 1 MB"),
+        (b"#" * (MAX_FILE_BYTES + 1), "a.yaml:1: is larger than 200 kB"),
     ],
 )
 def test_what_cannot_be_read_is_a_mistake_with_its_line(tmp_path: Path, content: str | bytes, mistake: str) -> None:

@@ -1,0 +1,34 @@
+"""The side file that machines write: it takes a value, or stays as it was."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from canhelm.errors import ConfigError
+from profiles.loader import load
+from profiles.side_file import write_values
+
+FORWARD: dict[tuple[str, ...], int] = {("drives", "rear_left", "direction"): -1}
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Path:
+    path = tmp_path / "lab.yaml"
+    path.write_text("extends: max2d\n", encoding="utf-8")
+    return path
+
+
+def test_a_value_is_in_the_profile_from_then_on(robot: Path) -> None:
+    write_values(robot, FORWARD)
+    assert load(robot).profile.drives["rear_left"].direction == -1
+
+
+@pytest.mark.parametrize("content", [b"[" * 5000, b"- 1\n", b"a: b: c\n", b"\xff", b"0b: 2024-13-45\n"])
+def test_one_that_is_damaged_is_told_and_left_alone(robot: Path, content: bytes) -> None:
+    side = robot.with_name("lab.calibration.yaml")
+    side.write_bytes(content)
+    with pytest.raises(ConfigError, match="lab\\.calibration\\.yaml"):
+        write_values(robot, FORWARD)
+    assert side.read_bytes() == content
