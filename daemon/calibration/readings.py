@@ -11,6 +11,7 @@ from typing import Final
 
 from canhelm.errors import UsageError
 
+FULL_TURN_DEG: Final = 360.0
 ALIKE_DEG: Final = 3.0
 """Wheels below this angle have no centre of turning worth the name; the mean of both is their angle."""
 
@@ -102,6 +103,7 @@ def _reading(row: list[str], where: str) -> Reading:
         reading = Reading(int(run), int(direction), float(true), float(sensed))
     except ValueError as error:
         raise UsageError(f"{where} is no reading: {error}", remedy="mend or remove the line") from None
-    if reading.direction not in (-1, 0, 1) or not math.isfinite(reading.true_deg + reading.sensed_deg):
+    angles = reading.true_deg, reading.sensed_deg
+    if reading.direction not in (-1, 0, 1) or not all(abs(angle) <= FULL_TURN_DEG for angle in angles):
         raise UsageError(f"{where} is no reading: {','.join(row)}", remedy="mend or remove the line")
     return reading

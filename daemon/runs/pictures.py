@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 import math
 import textwrap
 from collections.abc import Iterator, Mapping
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import msgspec
 
 from daemon.runs.signs import currents_at_limit, read_signs
 from daemon.runs.store import PROFILE, TERMS, Run, read_yaml
@@ -25,6 +25,20 @@ COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
 STYLES = ("-", "--")
 COLUMNS = 2
 SLIP = "slip along {}"
+
+
+class _Terms(msgspec.Struct):
+    """As much of a law's terms as is drawn."""
+
+    slip: Any = None
+    guidance: _Terms | None = None
+
+
+class _Step(msgspec.Struct):
+    """One line of them."""
+
+    time_s: float
+    terms: _Terms
 
 
 def draw(run: Run, path: Path) -> list[str]:
@@ -141,24 +155,24 @@ def _active(axes: Any, table: Table, times: Mapping[str, list[float]]) -> None:
 def _slips(run: Run) -> dict[str, list[float]]:
     """When the law detected slip, along each axis of the robot [s]; laws that detect none have no such term."""
     times: dict[str, list[float]] = {}
-    for time_s, terms in _terms(run):
-        for axis, slips in zip("xy", terms.get("guidance", terms).get("slip") or (), strict=False):
+    for step in _steps(run):
+        told = (step.terms.guidance or step.terms).slip
+        for axis, slips in zip("xy", told if isinstance(told, list) else (), strict=False):
             if slips:
-                times.setdefault(SLIP.format(axis), []).append(time_s)
+                times.setdefault(SLIP.format(axis), []).append(step.time_s)
     return times
 
 
-def _terms(run: Run) -> Iterator[tuple[float, dict[str, Any]]]:
+def _steps(run: Run) -> Iterator[_Step]:
     try:
-        lines = (run.folder / TERMS).read_text(encoding="utf-8").splitlines()
+        lines = (run.folder / TERMS).read_bytes().splitlines()
     except OSError:
         return
     for line in lines:
         try:
-            step = json.loads(line)
-        except ValueError:
+            yield msgspec.json.decode(line, type=_Step)
+        except msgspec.DecodeError:
             continue  # the last line of a daemon that was killed
-        yield step["time_s"], step["terms"]
 
 
 def _finish(axes: Any) -> None:

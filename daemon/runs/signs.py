@@ -7,6 +7,8 @@ from itertools import groupby
 from statistics import fmean, median
 from typing import Any
 
+import msgspec
+
 from daemon.runs.table import Table
 
 EQUAL_M_S = 1e-3
@@ -24,6 +26,12 @@ AT_LIMIT_SHARE = 0.01
 """Of a current limit, by which a current that is held there is measured beside it."""
 HELD_S = 0.1
 """A current that passes by a limit is away sooner."""
+
+
+class _Profile(msgspec.Struct):
+    """As much of a profile as is looked at here."""
+
+    drives: dict[str, dict[str, Any]] = {}
 
 
 def side_by_side(table: Table) -> list[int]:
@@ -70,8 +78,8 @@ def read_signs(table: Table, profile: Mapping[str, Any]) -> list[str]:
     currents = mean_currents_a(table, rows)
     away = {name: current - _others(currents, name) for name, current in currents.items()}
     name = max(away, key=lambda wheel: abs(away[wheel]))
-    continuous_a = float(profile["drives"][name]["continuous_current_a"])
-    if abs(away[name]) < OUTLIER_SHARE * continuous_a:
+    continuous_a = _current_limits(profile, name).get("continuous_current_a")
+    if continuous_a is None or abs(away[name]) < OUTLIER_SHARE * continuous_a:
         return []
     does, size = ("pushes", "larger") if away[name] > 0 else ("is dragged", "smaller")
     others = sorted(current for wheel, current in currents.items() if wheel != name)
@@ -91,11 +99,19 @@ def currents_at_limit(table: Table, profile: Mapping[str, Any]) -> dict[str, lis
     """
     times: dict[str, list[float]] = {}
     for name, column in table.of("current_a").items():
-        drive = profile.get("drives", {}).get(name, {})
-        for limit_a in [float(drive[key]) for key in CURRENT_LIMITS if key in drive]:
+        for limit_a in _current_limits(profile, name).values():
             if when := _held(table.time_s, column, limit_a):
                 times[f"{name} at {limit_a:g} A"] = when
     return times
+
+
+def _current_limits(profile: Mapping[str, Any], name: str) -> dict[str, float]:
+    """Those of :data:`CURRENT_LIMITS` that a drive has in a profile, which may be damaged [A]."""
+    try:
+        drive = msgspec.convert(profile, _Profile).drives.get(name, {})
+        return {key: msgspec.convert(drive[key], float) for key in CURRENT_LIMITS if key in drive}
+    except msgspec.ValidationError:
+        return {}
 
 
 def _held(time_s: Sequence[float], current_a: Sequence[float], limit_a: float) -> list[float]:

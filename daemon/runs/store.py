@@ -250,6 +250,6 @@ def read_yaml(path: Path) -> dict[str, Any]:
     """The mapping in a file; empty where the file is missing or damaged."""
     try:
         found = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, yaml.YAMLError):
+    except (OSError, ValueError, yaml.YAMLError, RecursionError):
         return {}
     return found if isinstance(found, dict) else {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from canhelm.errors import ConfigError
@@ -52,7 +52,11 @@ class Table:
 
 
 def read_table(run: Run) -> Table:
-    """The rows of a run; a last one that was cut short is left out. Raises ConfigError where there are none."""
+    """The rows of a run; a last one that was cut short is left out.
+
+    Raises:
+        ConfigError: there are none, or columns are missing that every run has.
+    """
     path = run.folder / CYCLES
     try:
         with path.open(newline="", encoding="utf-8") as file:
@@ -62,11 +66,19 @@ def read_table(run: Run) -> Table:
         columns = dict(zip(head, map(list, zip(*rows, strict=True)), strict=True)) if rows else {}
         texts = {name: column for name, column in columns.items() if name.endswith(TEXTS)}
         numbers = {name: list(map(_number, column)) for name, column in columns.items() if name not in texts}
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, csv.Error) as error:
         raise _no_rows(run, f"{path} cannot be read: {error}") from error
-    if "time_s" not in numbers or "limits" not in texts:
+    if not rows:
         raise _no_rows(run, f"{path} has no rows")
+    if missing := _needed(numbers) - columns.keys():
+        raise _no_rows(run, f"{path} has no column {min(missing)}")
     return Table(numbers, texts)
+
+
+def _needed(numbers: Iterable[str]) -> set[str]:
+    """Columns that those of a run presuppose: what was measured of a wheel stands beside what it was told."""
+    wheels = {name.rpartition(".")[0] for name in numbers if name.endswith((SPEED, ".current_a"))}
+    return {"time_s", "limits", "x_m", "y_m", *(f"{wheel}.commanded_m_s" for wheel in wheels)}
 
 
 def _number(text: str) -> float:

@@ -232,6 +232,14 @@ def test_readings_taken_before_are_fitted_without_a_daemon(tmp_path: Path, capsy
     assert load(profile).profile.encoders["front"].calibration is not None
 
 
+@pytest.mark.parametrize("angle", ["1e175", "-361", "inf", "nan"])
+def test_an_angle_of_more_than_a_turn_is_no_reading(tmp_path: Path, angle: str) -> None:
+    taken = tmp_path / "taken.csv"
+    taken.write_text(f"run,direction,true_deg,sensed_deg\n1,1,0.0,0.5\n1,1,4.0,{angle}\n", encoding="utf-8")
+    with pytest.raises(UsageError, match=r"taken\.csv:3 is no reading"):
+        read_readings(taken)
+
+
 def test_an_encoder_that_the_profile_lacks_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["calibrate", "bending", "--profile", "max2d", "--from", "none.csv", "--out", str(tmp_path)]) == 7
     assert "front" in capsys.readouterr().err

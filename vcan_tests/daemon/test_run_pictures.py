@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from canhelm.errors import ConfigError
 from daemon.cli.main import main
 from daemon.runs.pictures import panels
 from daemon.runs.signs import currents_at_limit, mean_currents_a, read_signs, side_by_side
@@ -193,6 +194,36 @@ def test_a_run_without_rows_is_said_to_be_damaged(tmp_path: Path, capsys: pytest
     (tmp_path / "0001").mkdir()
     assert main(["plot", "--runs", str(tmp_path)]) == 7
     assert "cycles.csv" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("column", ["limits", "x_m", "rear_left.commanded_m_s"])
+def test_a_run_without_a_column_that_every_run_has_is_damaged(tmp_path: Path, column: str) -> None:
+    (tmp_path / "cycles.csv").write_text(
+        "time_s,x_m,y_m,yaw_deg,rear_left.commanded_m_s,rear_left.speed_m_s,limits\n0,0,0,0,0,0,\n".replace(column, "y")
+    )
+    with pytest.raises(ConfigError, match=f"has no column {column}"):
+        read_table(Run(1, tmp_path, {}))
+
+
+@pytest.mark.parametrize(
+    "drives", ["", "drives: []", "drives: {rear_left: 5}", "drives: {rear_left: {continuous_current_a: x}}"]
+)
+def test_current_limits_that_a_profile_does_not_tell_are_none(tmp_path: Path, drives: str) -> None:
+    run = driven(tmp_path)
+    (run.folder / PROFILE).write_text(drives)
+    assert (signs_of(run), limits_of(run)) == ([], {})
+
+
+def test_terms_that_are_none_are_passed_over(tmp_path: Path) -> None:
+    run = driven(tmp_path)
+    (run.folder / TERMS).write_text('7\n{"time_s": 1}\n{"time_s": 1, "terms": {"guidance": 3}}\n{"time_s": ')
+    *_, active = panels(run, read_table(run), read_yaml(run.folder / PROFILE))
+    assert not any("slip" in name for name in active.keywords["times"])
+
+
+def test_facts_that_are_nested_without_end_are_none(tmp_path: Path) -> None:
+    (tmp_path / "run.yaml").write_text("[" * 5000)
+    assert read_yaml(tmp_path / "run.yaml") == {}
 
 
 def test_a_last_row_that_was_cut_short_is_left_out(tmp_path: Path) -> None:
