@@ -203,7 +203,7 @@ class NodeCommands:
         """Its node id; None where it is named by its identity."""
         if parse_identity(device) is not None:
             return None
-        return node_number(self._supervisor, int(device, 0) if device.lower().startswith("0x") else device)
+        return node_number(self._supervisor, device)
 
     async def _is_epos(self, node: int) -> bool:
         try:

@@ -36,6 +36,20 @@ async def test_driving_without_an_encoder_says_that_it_is_absent() -> None:
             await robot.call("steer", pair="front", angle_deg=5.0)
 
 
+@pytest.mark.parametrize("node", ["²", "٣", "0", "128", "0x", "0x80", "-1", "1e1", "9" * 200])
+async def test_what_only_looks_like_a_node_id_is_absent(node: str) -> None:
+    async with running_robot(powered=False, booted=False) as robot:
+        for method, more in (("sdo.read", {"object": "0x1000"}), ("nmt", {"command": "start"}), ("motor.stop", {})):
+            with pytest.raises(NodeAbsent, match=r"no (node|drive)"):
+                await robot.call(method, node=node, **more)
+
+
+@pytest.mark.parametrize("node", ["4", "0x4", "0X04", "004"])
+async def test_a_node_id_is_read_in_decimal_and_hexadecimal(node: str) -> None:
+    async with running_robot() as robot:
+        assert (await robot.call("sdo.read", node=node, object="0x1000"))["name"] == "device_type"
+
+
 @pytest.mark.parametrize("node", [77, "nix"])
 async def test_the_supply_of_a_node_that_is_not_simulated_cannot_be_switched(node: int | str) -> None:
     async with running_robot() as robot:
