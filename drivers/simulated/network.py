@@ -124,6 +124,14 @@ class SimulatedNetwork:
             for name, config in profile.encoders.items()
         }
         self.brakes = {name: self._brake(name, config) for name, config in profile.brakes.items()}
+        self._wire_inputs(profile)
+        self.scanner = self._make_scanner(profile, seed)
+        self._watch: asyncio.TimerHandle | None = None
+        for drive in self.drives.values():
+            drive.on_power_stage = self._on_power_stage
+
+    def _wire_inputs(self, profile: Profile) -> None:
+        """An accelerometer and emergency stops that nobody presses, at the inputs of drives."""
         sensor = self.world.accelerometer if isinstance(self.world, OmniWorld) else None
         if sensor is not None and profile.accelerometer is not None:
             for axis in range(2):
@@ -132,10 +140,6 @@ class SimulatedNetwork:
         for name, config in profile.drives.items():
             if config.emergency_stop:
                 self.drives[name].set_digital_input(config.emergency_stop.input, config.emergency_stop.pressed == "low")
-        self.scanner = self._make_scanner(profile, seed)
-        self._watch: asyncio.TimerHandle | None = None
-        for drive in self.drives.values():
-            drive.on_power_stage = self._on_power_stage
 
     def world_of(self, drive: str) -> BodyWorld:
         """The physics that a drive belongs to."""
