@@ -43,12 +43,18 @@ async def test_breaking_off_puts_everything_back(tmp_path: Path) -> None:
         assert all(brake.engaged for brake in shop.robot.network.brakes.values())
 
 
+async def lower(shop: Workshop) -> list[int]:
+    """Begin a setup, and lower the limits of one drive; what those of all drives were."""
+    limits = current_limits(shop)
+    await shop.call("setup.begin")
+    await shop.call("setup.lower", node="rear_left", current_ma=500)
+    assert current_limits(shop) != limits
+    return limits
+
+
 async def test_a_lease_that_runs_out_puts_everything_back_and_ends_the_setup(tmp_path: Path) -> None:
     async with workshop(robot_file(tmp_path)) as shop:
-        limits = current_limits(shop)
-        await shop.call("setup.begin")
-        await shop.call("setup.lower", node="rear_left", current_ma=500)
-        assert current_limits(shop) != limits
+        limits = await lower(shop)
         await shop.robot.fall_silent()
         await shop.robot.until(lambda: shop.robot.app.supervisor.setup_lease is None)
         assert current_limits(shop) == limits
@@ -58,9 +64,7 @@ async def test_a_lease_that_runs_out_puts_everything_back_and_ends_the_setup(tmp
 
 async def test_a_daemon_that_goes_down_meanwhile_puts_the_limits_back(tmp_path: Path) -> None:
     async with workshop(robot_file(tmp_path)) as shop:
-        limits = current_limits(shop)
-        await shop.call("setup.begin")
-        await shop.call("setup.lower", node="rear_left", current_ma=500)
+        limits = await lower(shop)
         await shop.robot.app.supervisor.close()
         assert current_limits(shop) == limits
 
@@ -75,9 +79,7 @@ async def test_once_the_daemon_has_gone_down_nothing_is_lowered_any_more(tmp_pat
 
 async def test_limits_whose_return_is_cut_off_come_back_with_the_end(tmp_path: Path) -> None:
     async with workshop(robot_file(tmp_path)) as shop:
-        limits = current_limits(shop)
-        await shop.call("setup.begin")
-        await shop.call("setup.lower", node="rear_left", current_ma=500)
+        limits = await lower(shop)
         await shop.call("simulation.fault", kind="lose", cob_id=0x602, times=1)
         restoring = asyncio.create_task(shop.call("setup.restore"))
         await asyncio.sleep(0.01)
