@@ -17,6 +17,8 @@ from canhelm.errors import ConfigError, PermissionRefused, Refused
 from daemon.api.peers import Rights
 
 LOGGER = logging.getLogger("canhelm.api")
+LONGEST_PATH = 107
+"""Bytes in the path of a Unix socket (unix(7): sun_path with the zero at its end)."""
 _ACL = "system.posix_acl_access"
 _ACL_VERSION = struct.pack("<I", 2)
 _ACL_ENTRY = struct.Struct("<HHI")
@@ -48,14 +50,15 @@ def open_listener(path: Path, rights: Rights, option: str = "--socket") -> socke
         ) from None
     except OSError as error:
         raise ConfigError(
-            f"no socket can be opened at {path}: {error.strerror or error}",
-            remedy=f"choose another place with {option} PATH (at most 107 characters)",
+            f"no socket can be opened at {path}: {error.strerror}", remedy=f"choose another place with {option} PATH"
         ) from None
     _give_to_groups(path, rights)
     return listener
 
 
 def _bind(path: Path) -> socket.socket:
+    if len(os.fsencode(path)) > LONGEST_PATH:
+        raise OSError(errno.ENAMETOOLONG, f"the path is longer than {LONGEST_PATH} bytes")
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     before = os.umask(0o117)
     try:

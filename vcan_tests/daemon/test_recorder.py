@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import errno
+import os
 import time
 from collections.abc import Iterator
 from io import FileIO
@@ -95,6 +96,20 @@ async def test_an_old_log_is_not_overwritten(port: SimulatedPort, tmp_path: Path
     with pytest.raises(ConfigError, match=r"run\.log"):
         record(port, tmp_path / "run.log")
     assert (tmp_path / "run.log").read_text() == "precious"
+
+
+@pytest.mark.parametrize("reason", [errno.EACCES, errno.EROFS, errno.ENOSPC])
+async def test_a_folder_that_cannot_be_written_to_is_told_in_one_sentence_with_the_way_out(
+    port: SimulatedPort, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reason: int
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(reason, os.strerror(reason))
+
+    monkeypatch.setattr(Path, "mkdir", refuse)
+    with pytest.raises(ConfigError) as caught:
+        record(port, tmp_path / "logs")
+    assert os.strerror(reason) in caught.value.message
+    assert caught.value.remedy == "name a folder that this user may write to, or a new file"
 
 
 async def send_for_5_s(port: SimulatedPort, disk: type[FragileDisk]) -> None:

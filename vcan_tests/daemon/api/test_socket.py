@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import os
 import socket
 import stat
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from canhelm import protocol
-from canhelm.errors import ConfigError, Refused
+from canhelm.errors import CanhelmError, ConfigError, PermissionRefused, Refused
+from daemon.api import listeners
 from daemon.api.server import Server
 from vcan_tests.daemon.api.raw_client import Connect, until
 from vcan_tests.daemon.fake_backend import FakeBackend
@@ -48,6 +51,32 @@ async def test_a_file_is_not_taken_for_a_socket(tmp_path: Path) -> None:
 async def test_a_path_that_is_too_long_is_refused_with_the_limit(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="107"):
         await Server(FakeBackend(), tmp_path / ("x" * 120)).start()
+
+
+@pytest.mark.parametrize(
+    ("reason", "kind"),
+    [
+        (errno.EACCES, PermissionRefused),
+        (errno.EPERM, PermissionRefused),
+        (errno.EROFS, ConfigError),
+        (errno.ENOSPC, ConfigError),
+        (errno.ENOENT, ConfigError),
+    ],
+)
+@pytest.mark.parametrize("step", [(Path, "mkdir"), (listeners, "_bind")])
+async def test_a_place_that_cannot_be_used_is_told_in_one_sentence_with_the_way_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: tuple[Any, str], reason: int, kind: type[CanhelmError]
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(reason, os.strerror(reason))
+
+    path = tmp_path / "robot.sock"
+    monkeypatch.setattr(*step, refuse)
+    with pytest.raises(kind) as caught:
+        await Server(FakeBackend(), path).start()
+    assert caught.value.message == f"no socket can be opened at {path}: {os.strerror(reason)}"
+    assert caught.value.remedy == "choose another place with --socket PATH"
+    assert not path.exists()
 
 
 async def test_a_server_that_closes_takes_its_socket_away(tmp_path: Path) -> None:
