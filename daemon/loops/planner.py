@@ -29,7 +29,8 @@ NEAR_M: Final = 1e-3
 NOTHING: Final = 1e-12
 """Smaller numbers are none [SI]."""
 LONGEST_CYCLE_S: Final = 10.0
-ROUNDING: Final = 1e-9
+ROUNDED: Final = 1 + 1e-9
+"""A velocity above its limit by this factor is at it."""
 
 
 class Result(StrEnum):
@@ -164,7 +165,7 @@ def plan_motion(start: PlanarState, goal: PlanarState, limits: PlanarLimits, now
     """
     if not _plannable(start, goal, limits, now):
         return _nothing(goal, limits)
-    fast = math.hypot(goal.vx, goal.vy) > limits.speed * (1 + ROUNDING) or abs(goal.rate) > limits.rate * (1 + ROUNDING)
+    fast = math.hypot(goal.vx, goal.vy) > limits.speed * ROUNDED or abs(goal.rate) > limits.rate * ROUNDED
     way, turn = _to_rest(start, limits) if fast else _together(start, goal, limits)
     return Plan(Result.GOAL_TOO_FAST if fast else Result.MOVING, now, start, goal, limits, way, turn)
 
@@ -244,11 +245,11 @@ def _together(start: PlanarState, goal: PlanarState, limits: PlanarLimits) -> tu
     travel = _vector(goal.x - start.x, goal.y - start.y)
     begin, end = _vector(start.vx, start.vy), _vector(goal.vx, goal.vy)
     angle = math.remainder(goal.heading - start.heading, math.tau)
+    fastest = planner_way.fastest(travel, begin, end, limits.speed, limits.acceleration, NEAR_M)
+    if math.hypot(angle, start.rate, goal.rate) < NOTHING:
+        return fastest, AxisPlan(0.0, ((fastest.duration, 0.0),))
     turn = _plain(angle), _plain(start.rate), _plain(goal.rate)
     turn_limits = limits.rate, limits.angular_acceleration
-    fastest = planner_way.fastest(travel, begin, end, limits.speed, limits.acceleration, NEAR_M)
-    if not any(turn):
-        return fastest, AxisPlan(0.0, ((fastest.duration, 0.0),))
     shortest = planner_axis.least_duration(*turn, *turn_limits)
     way = planner_way.lasting(fastest, travel, begin, end, shortest)
     matched = planner_axis.in_time(*turn, *turn_limits, way.duration)
@@ -280,8 +281,7 @@ def _near(planned: PlanarState, state: PlanarState, tolerance: Tolerance) -> boo
 def _result(plan: Plan, here: PlanarState, now: float) -> Result:
     if plan.result is not Result.MOVING:
         return plan.result
-    if math.hypot(here.vx, here.vy) > plan.allowed.speed * (1 + ROUNDING) or abs(here.rate) > plan.allowed.rate * (
-        1 + ROUNDING
-    ):
+    allowed = plan.allowed
+    if math.hypot(here.vx, here.vy) > allowed.speed * ROUNDED or abs(here.rate) > allowed.rate * ROUNDED:
         return Result.SLOWING
     return Result.ARRIVED if now >= plan.ends else Result.MOVING

@@ -12,8 +12,8 @@ maximum principles for optimal control problems with state constraints", SIAM Re
 from __future__ import annotations
 
 import cmath
-import math
 from collections.abc import Iterable
+from math import asinh, hypot
 from typing import NamedTuple
 
 Place = tuple[complex, complex]
@@ -65,7 +65,7 @@ class Bend(NamedTuple):
         direction: e.
         side: m, +1 if the acceleration turns counter-clockwise, else -1.
         shortest: d, positive.
-        begin: u at the start, where s = d sinh u.
+        begin: s at the start.
     """
 
     duration: float
@@ -80,17 +80,13 @@ class Bend(NamedTuple):
         return "bend"
 
     def at(self, time: float) -> Place:
-        _, velocity, direction, side, d, u0 = self
-        s0, r0 = d * math.sinh(u0), d * math.cosh(u0)
+        _, velocity, direction, side, d, s0 = self
         s = s0 + time
-        r, turned = math.hypot(s, d), math.asinh(s / d) - u0
-        along = r0 - r
-        x = r0 * time - (s * r - s0 * r0 + d * d * turned) / 2
-        y = side * d * (s * turned + along)
-        return (
-            velocity * time + direction * complex(x, y),
-            velocity + direction * complex(along, side * d * turned),
-        )
+        r0, r = hypot(s0, d), hypot(s, d)
+        along, turned = r0 - r, d * (asinh(s / d) - asinh(s0 / d))
+        x = r0 * time - (s * r - s0 * r0 + d * turned) / 2
+        y = side * (s * turned + d * along)
+        return velocity * time + direction * (x + y * 1j), velocity + direction * (along + side * turned * 1j)
 
 
 Arc = Ramp | Slide | Bend

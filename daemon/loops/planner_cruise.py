@@ -6,9 +6,9 @@ From the goal back in time to a cruise is the same problem as from the start to 
 
 from __future__ import annotations
 
-import cmath
-import math
+from cmath import rect
 from collections.abc import Callable
+from math import asin, atan2, copysign, cos, log, sin, sqrt
 from typing import Final, NamedTuple
 
 from daemon.loops.planner_arcs import Arc, Bend, Ramp, Slide, ramp_between
@@ -66,15 +66,16 @@ def cruise(half: Half, travel: complex, start: complex, end: complex, heading: c
         if not slope:
             return None
         step = (left.imag - begun - ended) / slope
-        if abs(step) > LONGEST_STEP:
-            step = math.copysign(LONGEST_STEP, step)
-        heading *= cmath.rect(1.0, step)
+        length = abs(step)
+        if length > LONGEST_STEP:
+            step = copysign(LONGEST_STEP, step)
+        heading *= rect(1.0, step)
         first_before, first = first, first_contact + first_slope * step
         last_before, last = last, last_contact + last_slope * step
         if (
-            abs(step) < CONVERGED
+            length < CONVERGED
             and _settled(start, step, first_before, first)
-            and _settled(end, step, last_before, last)
+            and (not end or _settled(end, step, last_before, last))
         ):
             return Cruise(heading, first, last)
     return None
@@ -112,27 +113,25 @@ def half_turn(velocity: complex, contact: float) -> Change:
     if across < FLAT:
         return 0.0, -along * (1 - along), 0.0, 0.0
     if along > 0.5 and 1 - along * along - across * across < ON_CIRCLE:
-        turned = math.copysign(1.0, signed)
-        return turned * (1 - along), -across, math.atan2(across, along), -turned
+        turned = copysign(1.0, signed)
+        return turned * (1 - along), -across, atan2(across, along), -turned
     p = contact if 0.0 < contact < STEEPEST else across * (0.87 + 0.08 * along - across * (0.74 - 0.69 * across))
-    s = math.sin(p)
+    s = sin(p)
     if s > across:
-        p, s = math.asin(across), across
-    c = math.cos(p)
+        p, s = asin(across), across
+    c = cos(p)
     b = s * s / (1 + c)
     q, root, h = _bend_to(along, c, s, b)
     steepness, tilt = q / root, along - across * c / root
     bent = 1 + s * (h - steepness)
     if bent < LEAST_BENT:
         bent = LEAST_BENT
-    narrow = 2 * c - 1
-    miss = (across - s - b * c * h) / (narrow * bent)
-    displaced = b * (along * c + across * root) + s * narrow * tilt * miss
-    slope = b * (across * c - along * root) - across * across * steepness - s * tilt * tilt / bent
-    contact_slope = tilt / (narrow * bent)
+    miss, turning, narrow = (across - s - b * c * h) / bent, tilt / bent, 2 * c - 1
+    displaced = b * (along * c + across * root) + s * tilt * miss
+    slope = b * (across * c - along * root) - across * across * steepness - s * tilt * turning
     if signed < 0.0:
-        displaced, contact_slope = -displaced, -contact_slope
-    return displaced, slope, p + miss, -contact_slope
+        return -displaced, slope, p + miss / narrow, turning / narrow
+    return displaced, slope, p + miss / narrow, -turning / narrow
 
 
 def _bend_to(along: float, c: float, s: float, b: float) -> tuple[float, float, float]:
@@ -140,8 +139,8 @@ def _bend_to(along: float, c: float, s: float, b: float) -> tuple[float, float, 
     q = (1 - along) / b
     if q < 1.0:
         q = 1.0
-    root = math.sqrt((q - 1) * (q + 1) + s * s)
-    return q, root, math.log((q + root) / (1 + s))
+    root = sqrt((q - 1) * (q + 1) + s * s)
+    return q, root, log((q + root) / (1 + s))
 
 
 def ramp_arcs(travel: complex, start: complex, end: complex, found: Cruise) -> list[Arc]:
@@ -158,9 +157,9 @@ def turn_arcs(travel: complex, start: complex, end: complex, found: Cruise) -> l
 
     None at all if the cruise would lead back.
     """
-    heading = found.heading
-    first, begun = _turn(start, heading, found.first, 1.0)
-    last, ended = _turn(end, heading, found.last, -1.0)
+    heading, first_contact, last_contact = found
+    first, begun = _turn(start, heading, first_contact, 1.0)
+    last, ended = _turn(end, heading, last_contact, -1.0)
     length = (travel * heading.conjugate()).real - begun - ended
     return [*first, Ramp(length, heading), *last] if length >= 0.0 else []
 
@@ -172,13 +171,13 @@ def _turn(velocity: complex, heading: complex, contact: float, toward: float) ->
     if not contact:
         ramp = ramp_between(velocity, heading) if toward > 0 else ramp_between(heading, velocity)
         return [ramp], (1 - along * along) / 2
-    c, s = math.cos(contact), math.sin(contact)
+    c, s = cos(contact), sin(contact)
     b = s * s / (1 + c)
     q, root, h = _bend_to(along, c, s, b)
-    bending, touch = b * (root - s), math.log((1 + s) / c)
+    bending = b * (root - s)
     forward = bending - b * b * (root * q + c * c * h - s) / 2 + s
-    side = -toward * math.copysign(1.0, across)
-    meeting = heading * complex(c, math.copysign(s, across))
+    side = -toward * copysign(1.0, across)
+    meeting = heading * complex(c, copysign(s, across))
     if toward > 0:
-        return [Bend(bending, velocity, heading, side, b * c, -touch - h), Slide(contact, meeting, side)], forward
-    return [Slide(contact, heading, side), Bend(bending, meeting, heading, side, b * c, touch)], forward
+        return [Bend(bending, velocity, heading, side, b * c, -b * root), Slide(contact, meeting, side)], forward
+    return [Slide(contact, heading, side), Bend(bending, meeting, heading, side, b * c, b * s)], forward

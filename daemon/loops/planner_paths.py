@@ -16,8 +16,8 @@ from daemon.loops.planner_axis import fastest, least_duration
 from daemon.loops.planner_bend import bend, bends, corner, keeps_limit, leads_farthest, ramps
 from daemon.loops.planner_cruise import cruise, half_ramp, half_turn, ramp_arcs, turn_arcs
 
-Shaped = tuple[str, Sequence[Arc]]
-"""Name of a shape, and its arcs; none if it does not exist."""
+Shaped = tuple[str, Sequence[Arc], bool]
+"""Name of a shape, its arcs, and whether no way is faster."""
 
 PRECISE: Final = 1e-11
 """Largest miss of an accepted way, relative to 1 + its length."""
@@ -31,8 +31,8 @@ FAR: Final = 1.8
 """Travel from which on there is nearly always room for a cruise."""
 CRUISES: Final = 0.999
 """Speed at the start above which its heading may be that of the cruise."""
-ROUGH: Final = 3e-2
-"""Part of the travel that a corner may miss from which the search for a smooth way begins."""
+ROUGH: Final = 0.3
+"""Last step to a corner, relative to its speed, from which the search for a smooth way begins."""
 SAME: Final = 1e-2
 """Distance of two corners that are one."""
 IN_LINE: Final = 1e-13
@@ -54,11 +54,11 @@ def fastest_way(travel: complex, start: complex, end: complex, near: float = 0.0
         return "ramp", chain(start, [ramp_between(start, end)])
     precise = PRECISE * (1 + abs(travel))
     best: tuple[str, Chain] | None = None
-    for shape, arcs in _ways(travel, start, end):
+    for shape, arcs, surely in _ways(travel, start, end):
         way = chain(start, arcs)
         if (best is None or way.duration < best[1].duration) and misses(way, travel, end) <= precise:
             best = shape, way
-            if _surely_fastest(way, travel, start, end):
+            if surely or any(way.duration <= LIKELY * least for least in _least_times(travel, start, end)):
                 return best
     slow = chain(start, stop_and_go(travel, start, end))
     return best if best and best[1].duration <= slow.duration else ("stop and go", slow)
@@ -66,24 +66,25 @@ def fastest_way(travel: complex, start: complex, end: complex, near: float = 0.0
 
 def _ways(travel: complex, start: complex, end: complex) -> Iterator[Shaped]:
     """Ways that may exist, the likely ones first."""
-    size = abs(travel)
+    size, begun, ended = abs(travel), abs(start), abs(end)
     if size > FAR:
         toward = travel / size
         left = travel - ((start + toward) * abs(toward - start) + (toward + end) * abs(toward - end)) / 2
         yield from _turns(travel, start, end, left)
-    if abs(start) > CRUISES:
+    if begun > CRUISES:
         yield from _turns(travel, start, end, start)
     known: list[complex] = []
     middle = (start + end) / 2
-    peak = math.sqrt(size + (abs(start) ** 2 + abs(end) ** 2) / 2)
-    for guess in travel * (peak / (size or 1.0)), middle, -middle:
-        via = corner(travel, start, end, guess, ROUGH)
-        if via is not None and all(abs(via - other) > SAME for other in known):
-            known.append(via)
-            yield from _ways_near(travel, start, end, via)
+    peak = math.sqrt(size + (begun * begun + ended * ended) / 2)
+    toward = travel - peak * middle
+    for guess in toward * (peak / (abs(toward) or 1.0)), travel * (peak / (size or 1.0)), middle, -middle:
+        via = corner(travel, start, end, guess, ROUGH * peak)
+        if via is None or (known and min(abs(via - other) for other in known) <= SAME):
+            continue
+        known.append(via)
+        yield from _ways_near(travel, start, end, via)
     for arc in bends(travel, start, end):
-        if keeps_limit(arc, end):
-            yield "bend", [arc]
+        yield from _bend(arc, travel, end)
 
 
 def _ways_near(travel: complex, start: complex, end: complex, via: complex) -> Iterator[Shaped]:
@@ -91,28 +92,33 @@ def _ways_near(travel: complex, start: complex, end: complex, via: complex) -> I
     speed = abs(via)
     if speed > LIKELY_CRUISE:
         yield from _turns(travel, start, end, via)
-    if (arc := bend(travel, start, end, via)) and keeps_limit(arc, end):
-        yield "bend", [arc]
+    if arc := bend(travel, start, end, via):
+        yield from _bend(arc, travel, end)
     if MAY_CRUISE < speed <= LIKELY_CRUISE:
         yield from _turns(travel, start, end, via)
-    if (exact := corner(travel, start, end, via)) is not None and abs(exact) <= 1:
-        yield "ramps", ramps(start, end, exact)
+    exact = corner(travel, start, end, via)
+    if exact is not None and not arc and (arc := bend(travel, start, end, exact)):
+        yield from _bend(arc, travel, end)
+    if exact is not None and abs(exact) <= 1:
+        yield "ramps", ramps(start, end, exact), False
     elif speed and (found := cruise(half_ramp, travel, start, end, via / speed)):
-        yield "ramps", ramp_arcs(travel, start, end, found)
+        yield "ramps", ramp_arcs(travel, start, end, found), False
 
 
-def _turns(travel: complex, start: complex, end: complex, heading: complex) -> Iterator[Shaped]:
-    """Two turns with a cruise near a heading."""
+def _bend(arc: Bend, travel: complex, end: complex) -> list[Shaped]:
+    """The bend, if it keeps the speed limit."""
+    return [("bend", [arc], leads_farthest(arc, travel, end))] if keeps_limit(arc, end) else []
+
+
+def _turns(travel: complex, start: complex, end: complex, heading: complex) -> list[Shaped]:
+    """Two turns with a cruise near a heading; they lead along it as far as any motion of their duration can.
+
+    So one that is shorter could not have a velocity along it at any time: held for what is left, it would lead farther.
+    """
     found = cruise(half_turn, travel, start, end, heading / abs(heading)) if heading else None
     if found and (arcs := turn_arcs(travel, start, end, found)):
-        yield "turns", arcs
-
-
-def _surely_fastest(way: Chain, travel: complex, start: complex, end: complex) -> bool:
-    """Whether no way is faster, or none by much."""
-    if len(way.arcs) == 1 and isinstance(arc := way.arcs[0], Bend) and leads_farthest(arc, end):
-        return True
-    return any(way.duration <= LIKELY * least for least in _least_times(travel, start, end))
+        return [("turns", arcs, (travel * found.heading.conjugate()).real > 0.0)]
+    return []
 
 
 def _least_times(travel: complex, start: complex, end: complex) -> Iterator[float]:

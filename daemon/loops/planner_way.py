@@ -70,20 +70,20 @@ def fastest(travel: complex, start: complex, end: complex, speed: float, acceler
         near: a straight change of velocity that ends as near to the goal as this [m] is taken as the way.
     """
     length = speed * speed / acceleration
-    goal, raw = travel / length, start / speed
-    begin, final = _within(raw), _within(end / speed)
-    if begin == raw:
-        return _way(*fastest_way(goal, begin, final, near / length), speed, acceleration)
+    goal, raw, final = travel / length, start / speed, end / speed
+    if abs(raw) <= 1.0 and abs(final) <= 1.0:
+        return _way(fastest_way(goal, raw, final, near / length), speed, acceleration)
+    begin = _within(raw)
     slowing = ramp_between(raw, begin)
     braked, _ = slowing.at(slowing.duration)
-    shape, onward = fastest_way(goal - braked, begin, final, near / length)
-    return _way(shape, chain(raw, [slowing, *onward.arcs]), speed, acceleration)
+    shape, onward = fastest_way(goal - braked, begin, _within(final), near / length)
+    return _way((shape, chain(raw, [slowing, *onward.arcs])), speed, acceleration)
 
 
 def braking(start: complex, speed: float, acceleration: float) -> Way:
     """The straight way to rest."""
     raw = start / speed
-    return _way("stop", chain(raw, [ramp_between(raw, 0j)]), speed, acceleration)
+    return _way(("stop", chain(raw, [ramp_between(raw, 0j)])), speed, acceleration)
 
 
 def lasting(way: Way, travel: complex, start: complex, end: complex, duration: float) -> Way:
@@ -121,14 +121,15 @@ def _with_a_rest(way: Way, travel: complex, start: complex, end: complex, durati
     brake, *onward = stop_and_go(travel * acceleration / (speed * speed), raw, end / speed)
     unrested = math.fsum(arc.duration for arc in (brake, *onward))
     rest = Ramp(max(0.0, duration * acceleration / speed - unrested), 0j)
-    return _way("stop and go", chain(raw, [brake, rest, *onward]), speed, acceleration)
+    return _way(("stop and go", chain(raw, [brake, rest, *onward])), speed, acceleration)
 
 
 def _within(velocity: complex) -> complex:
-    """The velocity in units of the limit, shortened to the limit."""
+    """The velocity, in units of the limit, shortened to the limit."""
     length = abs(velocity)
     return velocity / length if length > 1 else velocity
 
 
-def _way(shape: str, arcs: Chain, speed: float, acceleration: float) -> Way:
-    return Way(shape, speed, acceleration, arcs, arcs.duration * speed / acceleration)
+def _way(shaped: tuple[str, Chain], speed: float, acceleration: float) -> Way:
+    shape, arcs = shaped
+    return Way(shape, speed, acceleration, arcs, arcs.times[-1] * speed / acceleration)

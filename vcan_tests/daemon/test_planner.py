@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import cmath
 import math
+import random
 from dataclasses import astuple, replace
 
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 
 from daemon.loops.planner import NEAR_M, PlanarLimits, PlanarState, Result, Tolerance, follow, plan_motion
 from daemon.loops.planner_arcs import Arc, Bend, Ramp, Slide, chain
+from daemon.loops.planner_bend import bend_between, keeps_limit
 from daemon.loops.planner_paths import fastest_way, misses, stop_and_go
 from vcan_tests.daemon.planner_problems import Problem, drive, miss_m, miss_m_s, moved, random_problems
 
@@ -247,6 +249,19 @@ def test_an_arc_moves_as_it_says_and_accelerates_by_one(arc: Arc) -> None:
         velocity, acceleration = ((late - early) / (2 * h) for late, early in zip(after, before, strict=True))
         assert velocity == pytest.approx(here[1], abs=1e-8)
         assert abs(acceleration) == pytest.approx(1.0, abs=1e-8)
+
+
+def test_a_bend_is_within_the_speed_limit_if_all_of_its_velocities_are() -> None:
+    draw, seen = random.Random(SEED), set()
+    for _ in range(400):
+        start, end = (cmath.rect(draw.uniform(0.0, 1.0), draw.uniform(-math.pi, math.pi)) for _ in range(2))
+        middle, half = draw.uniform(-2.0, 2.0), draw.uniform(0.1, 4.0)
+        arc = bend_between(start, end, draw.choice((-1.0, 1.0)), middle - half, middle + half)
+        highest = max(abs(arc.at(arc.duration * part / 500)[1]) for part in range(501))
+        if abs(highest - 1.0) > 1e-4:
+            seen.add(highest < 1.0)
+            assert keeps_limit(arc, end) == (highest < 1.0)
+    assert seen == {True, False}
 
 
 @pytest.mark.parametrize(
