@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -36,6 +37,11 @@ _DRIVE_STATES: dict[State | None, DriveState] = {
 def drive_state(statusword: int) -> DriveState:
     """What a statusword means to whoever uses the drive."""
     return _DRIVE_STATES[state_of(statusword)]
+
+
+def is_powered(statusword: int) -> bool:
+    """Whether a statusword may be that of a drive with power."""
+    return drive_state(statusword) not in (DriveState.DISABLED, DriveState.FAULT)
 
 
 async def walk_to(drive: EposDrive, target: State, command: Commander) -> None:
@@ -96,6 +102,9 @@ async def switch_off_otherwise(drive: EposDrive) -> None:
     if state is None or state.power_stage_on:
         drive.master.send_nmt(NmtCommand.RESET_NODE, drive.node)
         raise _deaf(drive, "was switched off by restarting its node")
+    with contextlib.suppress(Timeout):  # until its readings tell so, too, which may be late
+        late_s = drive.master.network.sdo_timeout_s
+        await drive.waiters.reach(lambda word: not is_powered(word), "power stage off", within_s=late_s)
     raise _deaf(drive, "was switched off by SDO")
 
 

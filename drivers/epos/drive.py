@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import itertools
 import math
 from collections.abc import Callable
 from typing import Any
@@ -16,7 +18,7 @@ from drivers.contract import DriveState, Fault, NodeState
 from drivers.epos import device_control, moves
 from drivers.epos.codec import DRIVING_MODES, RPDO1, TPDO1, TPDO1_BYTES, TPDO2, make_rpdo3
 from drivers.epos.configure import EposSetup, emergency_words
-from drivers.epos.device_control import drive_state
+from drivers.epos.device_control import drive_state, is_powered
 from drivers.epos.emergency_stop_input import EmergencyStopInput
 from drivers.epos.objects import OBJECTS
 from drivers.epos.outputs import OutputBits
@@ -29,7 +31,7 @@ from profiles.schema import DriveConfig
 SENSOR_ERROR = 0x7320
 """Also sent when a setting of the sensor is changed (Firmware Specification 14.1.46): no fault while one configures."""
 INSIST_CYCLES = 5
-"""Cycles in which a drive has to show that it takes a quick stop."""
+"""Cycles in which a drive has to show that it takes a quick stop, or that it is off."""
 _unpack_tpdo1, _pack_rpdo1 = TPDO1.unpack, RPDO1.pack
 
 
@@ -212,12 +214,13 @@ class EposDrive(CanopenDevice):
         self._interrupt(Refused(f"{self.who} was disabled in the meantime", node=self.node))
         self._drop_target()
         self._command(Command.DISABLE_VOLTAGE)
-        off = (DriveState.DISABLED, DriveState.FAULT)
-        if self.state not in off:
-            wanted = "power stage off"
-            try:
-                await self.waiters.reach(lambda word: drive_state(word) in off, wanted, State.SWITCH_ON_DISABLED)
-            except Timeout:
+        if is_powered(self.statusword):
+            readings = itertools.count()
+            with contextlib.suppress(Timeout):
+                await self.waiters.reach(
+                    lambda word: not is_powered(word) or next(readings) == INSIST_CYCLES, "power stage off"
+                )
+            if is_powered(self.statusword):
                 await device_control.switch_off_otherwise(self)
 
     def quick_stop(self) -> None:

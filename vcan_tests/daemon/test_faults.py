@@ -72,6 +72,7 @@ async def test_a_fault_while_driving_stops_the_robot_by_name_and_a_reset_gets_it
         assert error.remedy
         assert (await robot.call("simulation.faults"))["faults"][0]["struck"] > 0
         await robot.call("simulation.clear_faults")
+        await asyncio.sleep(fault.get("delay_s", 0.0))
         await robot.until(lambda: all(device.node_state == "ready" for device in robot.app.devices.all))
         assert (await robot.call("reset"))["state"] == "idle"
         await robot.call("drive.parallel", angle_deg=0.0, speed_m_s=0.2, duration_s=0.3)
