@@ -21,6 +21,8 @@ MOTION = "motion"
 STOP = "stop"
 """Name of the tasks that switch every power stage off."""
 OFF = (DriveState.DISABLED, DriveState.FAULT)
+OVERRUN_S = 0.5
+"""How much longer than its ramp a wheel is waited for, before its drive is switched off all the same."""
 POWERLESS = (*OFF, DriveState.UNKNOWN)
 """As far as anybody knows."""
 
@@ -207,9 +209,8 @@ class Stopping:
         try:
             await self._insist()
             await self._settled()
-            for drive in self._drives:
-                if drive.node_state is NodeState.READY and drive.state not in POWERLESS:
-                    await self._try(drive.name, self.power_off(drive))
+            powered = [d for d in self._drives if d.node_state is NodeState.READY and d.state not in POWERLESS]
+            await asyncio.gather(*(self._try(drive.name, self.power_off(drive)) for drive in powered))
         finally:
             self._halting -= 1
 
@@ -240,10 +241,14 @@ class Stopping:
 
         Raises:
             NotReady: the drive is not ready.
+            Refused: two stops or others who switch it off cut in.
         """
         await self.brakes.secure(drive.name)
         try:
-            await drive.disable()
+            try:
+                await drive.disable()
+            except Refused:  # a stop that cut in has made a quick stop of it
+                await drive.disable()
         except DeviceFault as error:
             self._on_failure(error)
 
@@ -256,7 +261,7 @@ class Stopping:
 
         A wheel that does not come to rest within the time that its ramp needs is reported; waiting ends then.
         """
-        if not await self.rest.until_rest(self._vehicle.stopping_time_s() + 1.0):
+        if not await self.rest.until_rest(self._vehicle.stopping_time_s() + OVERRUN_S):
             moving = [drive.name for drive in self._drives if abs(drive.speed_m_s) > AT_REST_M_S]
             self._log.add(
                 "error",

@@ -210,19 +210,22 @@ class Supervisor:
             LOGGER.info("motion %s (%s) is over: %s", motion.identity, motion.kind, motion.ended.exception() or "done")
 
     async def _leave_as_found(self, drives: list[Drive], enabled_here: list[Drive]) -> None:
+        """All at once: a drive that does not hear is not left to push alone for longer than it takes to find out."""
         await self.until_rest()
-        for drive in drives:
-            if drive.node_state is not NodeState.READY or drive.state in (DriveState.FAULT, DriveState.UNKNOWN):
-                continue
-            try:
-                if drive in enabled_here or self._stopping.latched or self._stopping.closing:
-                    await self.power_off(drive)
-                elif drive.state is not DriveState.ENABLED:
-                    await drive.enable()
-                else:
-                    await drive.use_driving_mode()
-            except CanhelmError as error:
-                self.log.add("error", drive.name, error.message, error.remedy or "")
+        await asyncio.gather(*(self._leave(drive, drive in enabled_here) for drive in drives))
+
+    async def _leave(self, drive: Drive, enabled_here: bool) -> None:
+        if drive.node_state is not NodeState.READY or drive.state in (DriveState.FAULT, DriveState.UNKNOWN):
+            return
+        try:
+            if enabled_here or self._stopping.latched or self._stopping.closing:
+                await self.power_off(drive)
+            elif drive.state is not DriveState.ENABLED:
+                await drive.enable()
+            else:
+                await drive.use_driving_mode()
+        except CanhelmError as error:
+            self.log.add("error", drive.name, error.message, error.remedy or "")
 
     # --- the cycle ---------------------------------------------------------------------------------------------
 

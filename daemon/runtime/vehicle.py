@@ -162,9 +162,10 @@ class Vehicle(ABC):
         return drive.continuous_current_a if drive else math.inf
 
     def stopping_time_s(self) -> float:
-        """Time that the slowest quick-stop ramp needs from the fastest speed."""
-        wheels = self.profile.wheels.items()
-        return max((self.wheel_limit_m_s(name) / drive.quick_stop_m_s2 for name, drive in wheels), default=0.0)
+        """Time that the slowest quick-stop ramp needs from the present speeds."""
+        ramps = {name: drive.quick_stop_m_s2 for name, drive in self.profile.wheels.items()}
+        drives = (*self.drives, *self.aside)
+        return max((abs(drive.speed_m_s) / ramps[drive.name] for drive in drives), default=0.0)
 
     def status(self) -> dict[str, Any]:
         """The vehicle for ``status``."""

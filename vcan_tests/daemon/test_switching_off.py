@@ -1,0 +1,54 @@
+"""A whole simulated MAX2D whose drives are to be switched off, and what may keep them from it."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+
+import pytest
+
+from daemon.runtime.rest import AT_REST_CYCLES
+from daemon.runtime.stopping import OVERRUN_S
+from vcan_tests.robot import Robot, running_robot
+
+
+def _powered(robot: Robot) -> list[str]:
+    return [name for name, drive in robot.network.drives.items() if drive.motion.powered]
+
+
+@pytest.mark.parametrize("moment_s", [0.0, 0.004, 0.008, 0.012, 0.016])
+async def test_a_stop_while_drives_are_switched_off_leaves_none_with_power(moment_s: float) -> None:
+    async with running_robot() as robot:
+        driving = robot.begin("drive.parallel", angle_deg=0.0, speed_m_s=0.1, duration_s=0.2)
+        await robot.until(lambda: robot.speed_m_s > 0.09)
+        await robot.until(lambda: robot.app.supervisor.motions["1"].ended.done())
+        await asyncio.sleep(AT_REST_CYCLES * 0.01 + moment_s)
+        await robot.call("stop")
+        await driving
+        await asyncio.sleep(0.5)
+        assert _powered(robot) == []
+
+
+async def test_a_drive_that_hears_nothing_does_not_push_on_alone_when_the_others_are_off() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        driving = robot.begin("drive.parallel", angle_deg=0.0, speed_m_s=0.3, duration_s=0.5)
+        await robot.until(lambda: robot.speed_m_s > 0.28)
+        await robot.call("simulation.fault", kind="lose", cob_id=0x203)
+        await robot.until(lambda: robot.speed_m_s < 0.01)
+        begin = robot.network.world.pose[:2]
+        await driving
+        await asyncio.sleep(2.0)
+        assert math.dist(begin, robot.network.world.pose[:2]) < 0.02
+        assert _powered(robot) == []
+
+
+async def test_a_wheel_that_does_not_brake_is_switched_off_soon_after_its_ramp_should_be_over() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        driving = robot.begin("drive.parallel", angle_deg=0.0, speed_m_s=0.3, duration_s=5.0)
+        await robot.until(lambda: robot.speed_m_s > 0.28)
+        await robot.call("simulation.fault", kind="encoder_reversed", part="front_left")
+        await robot.until(lambda: robot.state == "fault")
+        ramp_s = 0.3 / min(drive.quick_stop_m_s2 for drive in robot.app.profile.drives.values())
+        await asyncio.sleep(ramp_s + OVERRUN_S + 0.1)
+        assert _powered(robot) == []
+        await driving
