@@ -9,6 +9,7 @@ from canhelm.errors import DeviceFault
 from daemon.loops.measurement import Command, Measurement
 from daemon.loops.paired_steer import PairedSteerLaw, PairedSteerRecord
 from daemon.loops.paired_steer_target import PairedSteerTarget
+from daemon.loops.steering import REST_SPEED_M_S
 from daemon.runtime.motions import Motion
 from daemon.runtime.streams import Streamed
 
@@ -48,10 +49,17 @@ class PairedSteerMotion(Motion):
         if self._target is not None:
             self._driven = record
         if record.failure:
-            self.fail(DeviceFault(f"{self.kind}: {record.failure}", remedy="`canhelm status` shows drives and brakes"))
+            told = f"{self.kind}: {record.failure}{self._rolling(measurement)}"
+            self.fail(DeviceFault(told, remedy="`canhelm status` shows drives and brakes"))
         elif record.done and not self.goes_on_at_rest:
             self.on_done(measurement.time_s)
         return command
+
+    def _rolling(self, measurement: Measurement) -> str:
+        """Which wheels roll, in brackets; empty where none does."""
+        speeds = zip(self.drives, measurement.wheel_speed_m_s, strict=False)
+        rolling = [name for name, speed in speeds if abs(speed) > REST_SPEED_M_S]
+        return f" ({', '.join(rolling)})" if rolling else ""
 
     def on_done(self, now_s: float) -> None:
         """The robot rests at the target, or after a stop."""
