@@ -158,15 +158,12 @@ class Demo(DemoRobot):
         observer = self._observer(track, begin_s, origin)
         app.supervisor.observers.append(observer)
         method, parameters = figure.request()
-        lease = app.service.open_lease("demo")
-        renewing = loop.create_task(self._renew(lease))
         self.tell(f"figure {figure.identity}: {figure.words}")
         try:
-            result = await app.service.call(method, parameters, lease)
+            async with self.lease("demo") as lease:
+                result = await app.service.call(method, parameters, lease)
         finally:
             app.supervisor.observers.remove(observer)
-            renewing.cancel()
-            app.service.close_lease(lease, "the demo is over")
         frames, cycles, late, busy_s = (now - then for now, then in zip(self.counts(), before, strict=True))
         duration_s = loop.time() - begin_s
         numbers: dict[str, Any] = {
@@ -185,11 +182,6 @@ class Demo(DemoRobot):
             numbers["line"] = {"cycle_hz": round(cycles / duration_s, 2), **line}
             self.tell(_line_words(numbers["line"]))
         return FigureResult(figure, numbers, track, self._centre_of_rotation(figure))
-
-    async def _renew(self, lease: str) -> None:
-        while True:
-            await asyncio.sleep(0.5)
-            self.app.service.renew_lease(lease)
 
     def _observer(self, track: Track, begin_s: float, origin: tuple[float, float, float]) -> Callable[[], None]:
         world, supervisor, loop = self.world, self.app.supervisor, asyncio.get_running_loop()

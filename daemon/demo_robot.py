@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 from canhelm.errors import Timeout
@@ -14,6 +15,7 @@ from profiles.faults import PlacedFault
 from profiles.schema import Profile
 
 BOOT_DEADLINE_S = 20.0
+RENEWAL_S = 0.5
 
 
 class DemoRobot:
@@ -68,6 +70,23 @@ class DemoRobot:
         finally:
             self.app.supervisor.observers.remove(look)
         self.tell(f"ready after {loop.time() - begin_s:.2f} s")
+
+    @asynccontextmanager
+    async def lease(self, client: str) -> AsyncIterator[str]:
+        """A lease that is renewed until the end of the context, as a client does it."""
+        service = self.app.service
+        lease = service.open_lease(client)
+        renewing = asyncio.create_task(self._renew(lease))
+        try:
+            yield lease
+        finally:
+            renewing.cancel()
+            service.close_lease(lease, f"the {client} is over")
+
+    async def _renew(self, lease: str) -> None:
+        while True:
+            await asyncio.sleep(RENEWAL_S)
+            self.app.service.renew_lease(lease)
 
     def counts(self) -> tuple[int, int, int, float]:
         """Frames, cycles, late cycles and busy time of the bus so far."""
