@@ -5,6 +5,7 @@ PYTHON ?= python3
 VENV := .venv
 PIP := $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check
 OUT ?= demo-out
+MINUTES ?= 10
 SERVICE_PYTHON ?= /usr/bin/python3
 PREFIX ?= /opt/canhelm
 PACKAGED = $(shell find canhelm daemon drivers profiles packaging systemd -type f ! -name '*.py[co]') \
@@ -12,7 +13,7 @@ PACKAGED = $(shell find canhelm daemon drivers profiles packaging systemd -type 
 PACKAGING = DESTDIR='$(DESTDIR)' PREFIX='$(PREFIX)' PYTHON='$(SERVICE_PYTHON)' PIP_PYTHON='$(VENV)/bin/python'
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo docs test lint vcan-test vcan-figures install uninstall deb client-wheel
+.PHONY: help venv demo docs test lint fuzz long-life vcan-test vcan-figures install uninstall deb client-wheel
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST)
@@ -30,6 +31,12 @@ docs: $(VENV)/.stamp-docs ## the documentation as a site of files, into site/; a
 test: lint ## style, types, import rules, then all tests
 	$(VENV)/bin/pytest -n auto --dist loadfile -m 'not real_time and not vcan and not systemd'
 	$(VENV)/bin/pytest -m 'real_time and not vcan and not systemd'
+
+fuzz: $(VENV)/.stamp-test ## any input to every reader and every wire: MINUTES=10 for each target, or TARGET=NAME alone
+	$(VENV)/bin/python -m vcan_tests.fuzz --minutes $(MINUTES) $(TARGET)
+
+long-life: $(VENV)/.stamp-test ## 12 virtual hours among people, programs and faults, in about one; figures into long-life-out/
+	$(VENV)/bin/python -m vcan_tests.long_life $(ARGS)
 
 vcan-test: $(VENV)/.stamp-test ## the tests on a kernel's CAN bus and under a real systemd, both booted if need be
 	$(VENV)/bin/python -m vcan_tests.kernel.suite $(ARGS)

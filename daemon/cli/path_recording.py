@@ -21,6 +21,8 @@ from daemon.loops.record_smoothing import smoothed
 COLUMNS = ("time_s", "x_m", "y_m", "yaw_deg", "trailer_x_m", "trailer_y_m", "trailer_yaw_deg")
 """Of a record; the last three are empty for a vehicle without a trailer."""
 LONGEST_RECORD = 1_000_000
+FARTHEST_M = 1e6
+"""Nobody has driven farther from where the daemon began."""
 SLIGHTEST_RAD = 1e-5
 """An arc that turns less is written as a line."""
 
@@ -139,7 +141,7 @@ def _rows(name: str) -> Iterator[list[str]]:
 
 def _pose(cells: Sequence[str]) -> Pose:
     x, y, yaw_deg = map(float, cells)
-    if not math.isfinite(x + y + yaw_deg):
+    if not (abs(x) <= FARTHEST_M and abs(y) <= FARTHEST_M and math.isfinite(yaw_deg)):
         raise ValueError(cells)
     return Pose(x, y, math.radians(yaw_deg))
 

@@ -106,7 +106,9 @@ def test_the_heading_of_a_fitted_path_is_within_half_a_turn(tmp_path: Path) -> N
     assert start.heading_deg == pytest.approx(90.0, abs=0.1)
 
 
-@pytest.mark.parametrize("text", ["", "0,0,0,0,,,\n0,0,0,0,,,\n", "time\n", "0,1,x,0,,,\n", "0,1,inf,0,,,\n"])
+@pytest.mark.parametrize(
+    "text", ["", "0,0,0,0,,,\n0,0,0,0,,,\n", "time\n", "0,1,x,0,,,\n", "0,1,inf,0,,,\n", "0,1e185,0,0,,,\n"]
+)
 def test_what_is_no_record_is_refused(text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     record = tmp_path / "way.csv"
     record.write_text(text)
