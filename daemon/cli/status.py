@@ -102,7 +102,7 @@ def _headline(data: Mapping[str, Any]) -> RenderableType:
     line = Text.assemble(str(data.get("robot")), "  ", (state, f"bold {_colour(state)}"))
     if data.get("message"):
         line.append(f"  {data['message']}")
-    if data.get("role"):
+    if data.get("role", "configure") != "configure":
         line.append(f"  (your role: {data['role']})", "dim")
     return line
 

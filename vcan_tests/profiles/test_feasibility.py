@@ -49,7 +49,7 @@ def test_a_drive_that_asks_for_too_much_is_told_what_is_possible(mistakes: Mista
         ("limits: {wheel_speed_m_s: 2.5}", "limits.wheel_speed_m_s: is 2.5 m/s, drive rear_right allows 2 m/s;"),
         (
             "limits: {acceleration_m_s2: 1.6}",
-            "limits.acceleration_m_s2: is 1.6 m/s^2, drive rear_right allows 1.5 m/s^2;",
+            "limits.acceleration_m_s2: is 1.6 m/s^2, drive rear_right allows 1.4 m/s^2;",
         ),
         ("limits: {steering_rim_speed_m_s: 3}", "limits.steering_rim_speed_m_s: is 3 m/s, the wheels' limit is 2 m/s;"),
         ("limits: {heading_deg: 88}", "limits.heading_deg: is 88 deg, the stops are at 88 deg; write less than 88"),
@@ -61,7 +61,7 @@ def test_a_drive_that_asks_for_too_much_is_told_what_is_possible(mistakes: Mista
         ("simulation: {supply_voltage_v: 12}", "max_speed_m_s: is 2 m/s, 12 V allow 1.42 m/s; write at most 1.42"),
         (
             "simulation: {tyre: {friction: 0.1}}",
-            "quick_stop_m_s2: is 2 m/s^2, mass, tyre and current allow 0.981 m/s^2;",
+            "quick_stop_m_s2: is 1.4 m/s^2, mass, tyre and current allow 0.981 m/s^2;",
         ),
     ],
 )
