@@ -66,12 +66,7 @@ class Results:
         self.finished.update(rows)
 
     def _read(self) -> None:
-        self._file.seek(0)
-        text = self._file.read()
-        whole = text[: text.rfind("\n") + 1]
-        self._file.seek(0)
-        self._file.truncate(len(whole.encode()))
-        self._file.seek(0, io.SEEK_END)
+        whole = whole_lines(self._file)
         if not whole:
             self._file.write(",".join(COLUMNS) + "\n")
             self._file.flush()
@@ -118,8 +113,19 @@ def opened(folder: Path, cases: Sequence[Case]) -> Iterator[Results]:
         ConfigError: the file is of another campaign, or another version of canhelm.
     """
     path = folder / CSV
+    with appended(path) as file:
+        yield Results(file, path, cases)
+
+
+@contextmanager
+def appended(path: Path) -> Iterator[TextIO]:
+    """A file that is read and written on by nobody else meanwhile, its folder included.
+
+    Raises:
+        UsageError: it cannot be made, or another campaign writes into it.
+    """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
         file = path.open("a+", encoding="utf-8", newline="")
     except OSError as error:
         raise UsageError(f"cannot write {path}: {error.strerror}", remedy="give a folder of yours with --out") from None
@@ -129,7 +135,18 @@ def opened(folder: Path, cases: Sequence[Case]) -> Iterator[Results]:
         except OSError:
             message = f"another campaign writes into {path}"
             raise UsageError(message, remedy="wait for it, or give another folder with --out") from None
-        yield Results(file, path, cases)
+        yield file
+
+
+def whole_lines(file: TextIO) -> str:
+    """What stands in a file to be written on; a last line that was cut short is taken away."""
+    file.seek(0)
+    text = file.read()
+    whole = text[: text.rfind("\n") + 1]
+    file.seek(0)
+    file.truncate(len(whole.encode()))
+    file.seek(0, io.SEEK_END)
+    return whole
 
 
 def write_parquet(results: Results, folder: Path) -> Path | None:

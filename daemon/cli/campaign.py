@@ -1,4 +1,4 @@
-"""``canhelm campaign``: series of simulated runs of the semi-trailer's laws, as in its thesis' chapter 6."""
+"""``canhelm campaign``: series of simulated runs: the semi-trailer's laws as in its thesis' chapter 6, and faults."""
 
 from __future__ import annotations
 
@@ -12,20 +12,19 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import App, Parameter
 from cyclopts.validators import Number
 
+from daemon.cli.campaign_faults import faults
+from daemon.cli.campaign_options import Out, Workers, progress_bar
 from daemon.cli.output import Json, console, say, show, wants_json, words
 from daemon.cli.pictures import can_draw
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
-
     from daemon.campaigns.cases import Case, Outcome
     from daemon.campaigns.tables import Row
 
 app = App(name="campaign", help="Series of simulated runs, resumable, on all cores or a Dask cluster.")
+app.command(faults)
 
-Workers = Annotated[int | None, Parameter(validator=Number(gte=1), help="Processes; one a core without it.")]
 Dask = Annotated[str | None, Parameter(help="Address of a Dask scheduler, whose workers drive instead.")]
-Out = Annotated[Path, Parameter(help="Folder for results and pictures; a campaign that was ended goes on there.")]
 
 
 @app.command
@@ -104,7 +103,7 @@ def drive_missing(cases: Sequence[Case], out: Path, workers: int | None, dask: s
         count = workers or len(os.sched_getaffinity(0))
         begin = time.perf_counter()
         try:
-            with _progress() as progress:
+            with progress_bar() as progress:
                 bar = progress.add_task("runs", total=len(cases), completed=len(cases) - len(missing))
                 for batch in drive_all(missing, count, dask):
                     results.keep(batch)
@@ -117,16 +116,6 @@ def drive_missing(cases: Sequence[Case], out: Path, workers: int | None, dask: s
             say(f"{len(missing)} runs in {took:.1f} s with {where}: {len(missing) / took:.3g} runs/s")
         write_parquet(results, out)
         return results.in_order()
-
-
-def _progress() -> Progress:
-    from rich import progress
-
-    columns = (progress.BarColumn(), progress.MofNCompleteColumn(), progress.TimeRemainingColumn())
-    on = console(stderr=True)
-    return progress.Progress(
-        "[progress.description]{task.description}", *columns, console=on, disable=not on.is_terminal
-    )
 
 
 def _show(named: Mapping[str, Sequence[Row]], json: bool | None) -> None:
