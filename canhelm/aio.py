@@ -59,7 +59,7 @@ class Client:
         path = protocol.choose_socket(self._socket_path, self._robot)
         connection = protocol.open_socket(path)
         connection.setblocking(False)
-        reader, self._writer = await asyncio.open_unix_connection(sock=connection, limit=protocol.MAX_ANSWER_BYTES)
+        reader, self._writer = await asyncio.open_connection(sock=connection, limit=protocol.MAX_ANSWER_BYTES)
         self._reading = asyncio.create_task(self._read(reader))
         if self._socket_path and self._robot:
             await self._check(path, self._robot)

@@ -14,7 +14,8 @@ import socket
 from pathlib import Path
 from typing import Any
 
-from canhelm.errors import DaemonNotRunning, PermissionRefused, UsageError, from_rpc
+from canhelm import tcp
+from canhelm.errors import CanhelmError, DaemonNotRunning, PermissionRefused, UsageError, from_rpc
 
 API_VERSION = 1
 MAX_REQUEST_BYTES = 65_536
@@ -237,8 +238,11 @@ def open_socket(path: str | os.PathLike[str], timeout_s: float = 5.0) -> socket.
 
     Raises:
         DaemonNotRunning: nobody listens there.
-        PermissionRefused: somebody may, but this user may not open it.
+        PermissionRefused: somebody may, but this user may not open it, or the token for ``tcp:HOST:PORT`` is wrong.
+        ConfigError: there is no token.
     """
+    if os.fspath(path).startswith(tcp.PREFIX):
+        return _open_over_tcp(os.fspath(path), timeout_s)
     connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     connection.settimeout(timeout_s)
     try:
@@ -251,6 +255,24 @@ def open_socket(path: str | os.PathLike[str], timeout_s: float = 5.0) -> socket.
         raise DaemonNotRunning(
             f"no daemon answers on {os.fspath(path)}: {error.strerror or error}", remedy=_how_to_start(Path(path))
         ) from None
+    return connection
+
+
+def _open_over_tcp(address: str, timeout_s: float) -> socket.socket:
+    token = tcp.own_token()
+    connection = tcp.connected(address, timeout_s)
+    try:
+        connection.sendall(make_request(0, "login", {"token": token}))
+        answer = parse_message(tcp.first_line(connection))
+        if isinstance(answer, str):
+            raise DaemonNotRunning(f"what answers on {address} is no daemon", remedy="look at host and port")
+        result_of(answer)
+    except (OSError, CanhelmError) as error:
+        connection.close()
+        if isinstance(error, CanhelmError):
+            raise
+        told = f"the daemon on {address} hung up: {error.strerror or error}"
+        raise DaemonNotRunning(told, remedy="try again in a few seconds") from None
     return connection
 
 

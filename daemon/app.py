@@ -32,6 +32,7 @@ from profiles.faults import PlacedFault
 from profiles.schema import Profile
 
 if TYPE_CHECKING:
+    from daemon.api.door import Door
     from daemon.api.gateway309 import Gateway309
     from daemon.api.peers import Rights
     from daemon.api.server import Server
@@ -56,6 +57,21 @@ class GatewayAccess:
     writable: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class TcpAccess:
+    """How clients reach the API over TCP.
+
+    Attributes:
+        host: address to listen on.
+        port: to listen on.
+        tokens: file of the tokens that open it.
+    """
+
+    host: str
+    port: int
+    tokens: Path
+
+
 class App:
     """One robot's daemon: bus, master, devices, supervisor, cycle, recorder and server.
 
@@ -73,6 +89,7 @@ class App:
         runs: where each motion leaves a run; None for nowhere.
         inherited: sockets that listen already, by their paths; the service manager has opened them and takes them away.
         faults: that strike the simulated network; counted from its start.
+        tcp: where the API is served over TCP, too; None for nowhere.
         groups: names of those whose members may watch, drive and configure; None: the usual ones.
     """
 
@@ -93,6 +110,7 @@ class App:
         runs: RunStore | None = None,
         faults: Sequence[PlacedFault] = (),
         groups: tuple[str, str, str] | None = None,
+        tcp: TcpAccess | None = None,
     ) -> None:
         self.spec = bus
         self.wire = wire = make_wire(bus, profile, seed, built)
@@ -123,6 +141,7 @@ class App:
         self._localise(commands)
         self._groups = groups
         self.server = self._serve(socket) if socket else None
+        self.door = self._serve_network(self.server, tcp) if self.server and tcp else None
         self.gateway = self._serve_tools(gateway) if gateway else None
 
     def _make_faults(self, seed: int) -> Faults | None:
@@ -155,6 +174,12 @@ class App:
 
         return Server(self.service, socket, self._inherited.get(socket), self._rights())
 
+    def _serve_network(self, server: Server, access: TcpAccess) -> Door:
+        from daemon.api.door import Door
+        from daemon.api.tokens import load_tokens
+
+        return Door(server, access.host, access.port, load_tokens(access.tokens))
+
     def _serve_tools(self, access: GatewayAccess) -> Gateway309:
         from daemon.api.gateway309 import Gateway309
 
@@ -181,6 +206,8 @@ class App:
             self.faults.load(self._faults_to_set)
         if self.server is not None:
             await self.server.start()
+        if self.door is not None:
+            await self.door.start()
         if self.gateway is not None:
             await self.gateway.start()
         if self._record is not None:
@@ -236,6 +263,8 @@ class App:
             self.faults.close()
         if self.network is not None:
             await self.network.close()
+        if self.door is not None:
+            self.door.close()
         if self.server is not None:
             await self.server.close()
         if self.service.runs is not None:

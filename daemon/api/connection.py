@@ -41,19 +41,21 @@ class Connection(asyncio.Protocol):
 
     Args:
         server: who it belongs to.
+        peer: who it is; None: whom the kernel names.
 
     Attributes:
         subscribed: whether it hears of events.
         crowded: there are too many clients; this one may only stop the robot.
     """
 
-    def __init__(self, server: Server) -> None:
+    def __init__(self, server: Server, peer: Peer | None = None) -> None:
         self.subscribed = False
         self.crowded = False
         self._server = server
         self._heard_s = asyncio.get_running_loop().time()
         self._transport: asyncio.Transport | None = None
-        self._peer = Peer.nobody()
+        self._known = peer is not None
+        self._peer = peer or Peer.nobody()
         self._name = f"client {next(_numbers)}"
         self._received = bytearray()
         self._handling = False
@@ -83,8 +85,9 @@ class Connection(asyncio.Protocol):
         """A client is there."""
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
-        self._peer = self._server.rights.peer(transport.get_extra_info("socket"))
-        self._name = f"client {self._name.split()[-1]} (pid {self._peer.pid})"
+        if not self._known:
+            self._peer = self._server.rights.peer(transport.get_extra_info("socket"))
+        self._name = f"client {self._name.split()[-1]} ({self._peer.name or f'pid {self._peer.pid}'})"
         self._server.admit(self)
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -279,8 +282,7 @@ class Connection(asyncio.Protocol):
             except Refused:
                 self._lease = None
         if self._lease is None:
-            who = self._peer.details()
-            self._lease = backend.open_lease("{user} (pid {pid}: {command})".format(**who), who)
+            self._lease = backend.open_lease(self._peer.told(), self._peer.details())
         return self._lease
 
     async def _renew(self, params: dict[str, Any]) -> dict[str, Any]:

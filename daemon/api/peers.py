@@ -48,12 +48,14 @@ class Peer:
         uid: its user.
         groups: its groups.
         role: the most it may do.
+        name: of one that came over the network, for people.
     """
 
     pid: int
     uid: int
     groups: frozenset[int]
     role: Role
+    name: str = ""
 
     @classmethod
     def nobody(cls) -> Peer:
@@ -63,11 +65,19 @@ class Peer:
     @property
     def user(self) -> str:
         """Name of its user."""
-        return _user(self.uid)
+        return self.name or _user(self.uid)
 
     def details(self) -> dict[str, Any]:
-        """User, process id and command, for status and messages."""
-        return {"user": self.user, "pid": self.pid, "command": command_of(self.pid)}
+        """User, process id and command, for status."""
+        return {"user": self.user} if self.name else {"user": self.user, "pid": self.pid, "command": self._command}
+
+    def told(self) -> str:
+        """The same for messages."""
+        return self.name or f"{self.user} (pid {self.pid}: {self._command})"
+
+    @property
+    def _command(self) -> str:
+        return command_of(self.pid)
 
 
 class Rights:
@@ -117,6 +127,9 @@ class Rights:
         """
         if _RANK[peer.role] >= _RANK[role]:
             return None
+        if peer.name:
+            told = f"{what} needs the role {role}; {peer.name} has not got it"
+            return PermissionRefused(told, remedy=f"log in with a token for {role}")
         giving = " or ".join(name for other, name in self._names.items() if _RANK[other] >= _RANK[role])
         has = ", ".join(sorted(map(_group, peer.groups)))
         return PermissionRefused(
@@ -137,8 +150,8 @@ def command_of(pid: int) -> str:
     except OSError:
         return "unknown command"
     if len(words) > 1 and Path(words[0]).name.startswith("python"):
-        del words[0]
-    told = " ".join((Path(words[0]).name, *words[1:])).strip()
+        del words[: 2 if words[1] == "-m" else 1]
+    told = " ".join([Path(word).name for word in words[:1]] + words[1:]).strip()
     return "".join(sign for sign in told if sign.isprintable())[:_COMMAND_LENGTH]
 
 

@@ -20,9 +20,11 @@ from daemon.cli import journal
 from daemon.cli.output import say
 
 if TYPE_CHECKING:
-    from daemon.app import App
+    from daemon.app import App, TcpAccess
     from daemon.runs.store import RunStore
     from profiles.schema import Profile
+
+LOOPBACK = "127.0.0.1"
 
 
 def run(
@@ -47,6 +49,8 @@ def run(
     watch_group: str = "canhelm-watch",
     drive_group: str = "canhelm",
     configure_group: str = "canhelm-admin",
+    tcp: str | None = None,
+    tokens: Path | None = None,
 ) -> int:
     """Run a robot's daemon in the foreground until Ctrl-C or SIGTERM; then it stops the vehicle and goes down.
 
@@ -77,6 +81,8 @@ def run(
         watch_group: Members of this group may watch the robot (docs/rights.md).
         drive_group: Members of this one may drive it, too.
         configure_group: Members of this one may change its settings, too.
+        tcp: PORT of the loopback interface, or HOST:PORT, on which clients with a token are served, too.
+        tokens: File of lines, each a role and a token that gives it; only its owner may read it.
     """
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is not signal.SIG_IGN:
@@ -97,6 +103,7 @@ def run(
     struck_by = load_faults(faults, robot) if faults else ()
     if profile and bit_rate is not None:
         raise UsageError("--bit-rate is for a bus without a profile", remedy="write network.bit_rate in the profile")
+    served_over_tcp = tcp_access(tcp, tokens)
     for given in (socket, gateway):
         _require_folder(given)
     journal.log_to_stderr(os.environ)
@@ -118,10 +125,24 @@ def run(
         profile_file=loaded.path.resolve() if loaded else None,
         faults=struck_by,
         groups=(watch_group, drive_group, configure_group),
+        tcp=served_over_tcp,
     )
     runner: Callable[[Coroutine[Any, Any, str]], str] = run_patient if simulates(chosen) else asyncio.run
     say(runner(_live(make_app, profile, robot)))
     return 0
+
+
+def tcp_access(address: str | None, tokens: Path | None) -> TcpAccess | None:
+    """Where the API is served over TCP. Raises UsageError for half of it, or an address that is none."""
+    from canhelm.tcp import split_address
+    from daemon.app import TcpAccess
+
+    if address is None and tokens is None:
+        return None
+    if address is None or tokens is None:
+        raise UsageError("--tcp and --tokens need each other", remedy="give both: --tcp PORT --tokens FILE")
+    host, port = split_address(address if ":" in address else f"{LOOPBACK}:{address}")
+    return TcpAccess(host, port, tokens)
 
 
 def _unknown(bus: str, bit_rate: int | None) -> Profile:

@@ -14,8 +14,9 @@ from pathlib import Path
 import pytest
 
 from canhelm.errors import ConfigError
-from daemon.app import App
+from daemon.app import App, GatewayAccess, TcpAccess
 from daemon.cli.main import main
+from daemon.cli.run import tcp_access
 from daemon.life import Life
 from daemon.runtime.notify import ServiceManager
 from profiles.loader import load
@@ -118,6 +119,42 @@ def test_the_folder_of_a_socket_is_not_made_up(option: str, tmp_path: Path, caps
     assert main([*SIMULATED, option, str(tmp_path / "none" / "x.sock")]) == 7
     assert f"there is no folder {tmp_path / 'none'}" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--tcp", "4310"], "--tcp and --tokens need each other"),
+        (["--tokens", "tokens"], "--tcp and --tokens need each other"),
+        (["--tcp", "robot:http", "--tokens", "tokens"], "is no address"),
+    ],
+)
+def test_half_of_a_network_access_is_wrong_usage(
+    arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*SIMULATED, *arguments]) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_tokens_that_others_may_read_keep_a_daemon_from_beginning(tmp_path: Path) -> None:
+    tokens = tmp_path / "tokens"
+    tokens.write_text(f"drive {'d' * 32}")
+    tokens.chmod(0o644)
+    with pytest.raises(ConfigError, match="others than its owner may use"):
+        App(load("max2d").profile, socket=tmp_path / "x.sock", tcp=TcpAccess("127.0.0.1", 0, tokens))
+
+
+@pytest.mark.parametrize(("address", "host"), [("4310", "127.0.0.1"), ("10.0.0.7:4310", "10.0.0.7")])
+def test_a_port_alone_is_one_of_the_loopback_interface(address: str, host: str, tmp_path: Path) -> None:
+    access = tcp_access(address, tmp_path)
+    assert access is not None
+    assert (access.host, access.port) == (host, 4310)
+
+
+def test_nothing_listens_on_a_network_unless_it_is_told_to(tmp_path: Path) -> None:
+    app = App(load("max2d").profile, socket=tmp_path / "x.sock", gateway=GatewayAccess(tmp_path / "x.309.sock"))
+    assert app.gateway is not None
+    assert (app.door, app.gateway.tcp_port) == (None, None)
 
 
 def test_an_empty_record_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,75 @@
+"""The file of tokens: who may read it, and what a token gives."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from canhelm.errors import ConfigError
+from daemon.api.parameters import Role
+from daemon.api.tokens import SHORTEST, Tokens, load_tokens
+
+WATCHES, DRIVES = "w" * SHORTEST, "d" * SHORTEST
+
+
+def written(path: Path, text: str, mode: int = 0o600) -> Path:
+    path.write_text(text)
+    path.chmod(mode)
+    return path
+
+
+def test_each_token_of_a_file_gives_its_role(tmp_path: Path) -> None:
+    tokens = load_tokens(written(tmp_path / "tokens", f"watch {WATCHES}\n\n  drive {DRIVES}\n"))
+    assert [tokens.role_of(token) for token in (WATCHES, DRIVES)] == [Role.WATCH, Role.DRIVE]
+
+
+@given(st.text())
+def test_nothing_else_gives_a_role(token: str) -> None:
+    assert Tokens({WATCHES: Role.WATCH}).role_of(token) is None
+
+
+@pytest.mark.parametrize("mode", [0o640, 0o604, 0o620, 0o666])
+def test_a_file_that_others_may_use_is_refused(tmp_path: Path, mode: int) -> None:
+    path = written(tmp_path / "tokens", f"watch {WATCHES}\n", mode)
+    with pytest.raises(ConfigError, match="others than its owner") as caught:
+        load_tokens(path)
+    assert "chmod 600" in str(caught.value.remedy)
+
+
+def test_a_file_of_somebody_else_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = written(tmp_path / "tokens", f"watch {WATCHES}\n")
+    found = os.stat_result((0o100600, 1, 1, 1, 54_321, 1, 1, 0, 0, 0))
+    monkeypatch.setattr(os, "fstat", lambda descriptor: found)
+    with pytest.raises(ConfigError, match="belongs to somebody else"):
+        load_tokens(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "has no token"),
+        (f"watch {WATCHES}\nboss {DRIVES}\n", ":2: 'boss' is no role"),
+        (f"stop {WATCHES}\n", ":1: 'stop' is no role"),
+        ("watch short\n", f":1: the token is shorter than {SHORTEST} characters"),
+        (f"watch {WATCHES} more\n", ":1: the token is shorter"),
+        ("watch\n", ":1: the token is shorter"),
+    ],
+)
+def test_a_line_that_is_no_token_is_told_with_its_place(tmp_path: Path, text: str, told: str) -> None:
+    with pytest.raises(ConfigError, match=told) as caught:
+        load_tokens(written(tmp_path / "tokens", text))
+    assert WATCHES not in str(caught.value)
+
+
+def test_a_file_that_is_missing_or_no_text_is_told(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="No such file"):
+        load_tokens(tmp_path / "none")
+    binary = tmp_path / "binary"
+    binary.touch(0o600)
+    binary.write_bytes(b"\xff\xfe")
+    with pytest.raises(ConfigError, match="it is no text"):
+        load_tokens(binary)
