@@ -18,6 +18,7 @@ from daemon.campaigns.faults.results import LINES, SUMMARY, opened, table, write
 from daemon.campaigns.faults.strikes import OTHER_ROBOTS, STRIKES, Injection
 from daemon.campaigns.faults.workers import outcomes_of
 from daemon.cli.main import main
+from daemon.runtime import watch
 from daemon.runtime.stopping import Stopping
 from drivers.contract import Drive
 from drivers.simulated.brake import SimulatedBrake
@@ -94,6 +95,13 @@ def test_a_drive_that_keeps_its_power_is_told(monkeypatch: pytest.MonkeyPatch) -
     outcome = try_one(Injection("estop", 240), 1).outcome
     assert outcome is not None
     assert "torque" in outcome.violations
+
+
+def test_silence_that_nobody_notices_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(watch, "SILENT_CYCLES", 20)
+    outcome = try_one(Injection("silence", 240), 1).outcome
+    assert outcome is not None
+    assert "notice" in outcome.violations
 
 
 def test_a_brake_that_does_not_engage_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

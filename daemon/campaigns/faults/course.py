@@ -245,7 +245,7 @@ class Course:
         self.outcome = Outcome(injection.strike, injection.index, self._manoeuvre, part, self._loop.time())
         strike, judge = STRIKES[injection.strike], self.judge
         wild = strike.kind.startswith("encoder_") and part in self._app.profile.drives
-        judge.strike(strike.reach, wild=wild)
+        judge.strike(strike.reach, wild=wild, silences=strike.silences)
         cut_off = part is None and strike.reach == "life"
         brakes = self._app.profile.brakes.items()
         judge.deaf = frozenset(name for name, brake in brakes if cut_off or part in (name, brake.drive))
@@ -291,7 +291,7 @@ class Course:
         if lasts:
             await asyncio.sleep(MENDED_S)
         self.judge.deaf = frozenset()
-        self.judge.strike("pdo", wild=False)
+        self.judge.strike("pdo", wild=False, silences=False)
         if not await self._until(self._all_ready, self._limits.ready_s):
             self.judge.violated("recovery", f"not ready again: {self._supervisor.message}")
         action = await self._reset() if self._supervisor.state in LATCHED else "nothing"

@@ -54,6 +54,7 @@ class Judge:
         self._encoders = tuple(app.profile.encoders)
         self._headings = dict.fromkeys(self._encoders, (0.0, 0.0))
         self._fastest_m_s = self._rest_by_s = self._off_by_s = 0.0
+        self._notice_by_s = math.inf
         self._rested_m: tuple[float, ...] | None = None
         self._ways_m: list[tuple[float, tuple[float, ...]]] = []
         self._free_since_s: dict[str, float] = {}
@@ -92,8 +93,9 @@ class Judge:
             self._rest_by_s = self._off_by_s = 0.0
             self.allow(slowing_m_s2)
 
-    def strike(self, reach: Reach, *, wild: bool) -> None:
+    def strike(self, reach: Reach, *, wild: bool, silences: bool) -> None:
         """Something breaks: a stop that is under way may take as long as if it began now."""
+        self._notice_by_s = self._loop.time() + self._limits.noticed_s if silences else math.inf
         self.reach, self.wild = reach, wild
         self._ways_m.clear()
         self.allow()
@@ -148,6 +150,8 @@ class Judge:
         self._ways_m.append((now_s, self._rolled_m()))
         if not self.live:
             self._check_stopped(now_s)
+        elif now_s > self._notice_by_s:
+            self.violated("notice", "a device says nothing, and its command is still live")
         self._check_limits(fastest_m_s)
         self._check_brakes(now_s)
         self._timer = self._loop.call_later(LOOK_S, self._look)

@@ -35,6 +35,8 @@ class Strike:
         reach: how a drive that it concerns hears of a stop: by its PDOs, by SDO after those were in vain, or not at
             all, so that only the end of its life time stops it.
         lies: whether readings or targets are wrong by as much as no check can notice, so that an answer may be, too.
+        silences: whether a device says nothing that can be used any more, which is to be noticed
+            while a command is live.
         ids: identifiers of the frames that it can strike.
         lengths: of their data.
     """
@@ -44,6 +46,7 @@ class Strike:
     fields: Mapping[str, Any] = field(default_factory=dict)
     reach: Reach = "pdo"
     lies: bool = False
+    silences: bool = False
     ids: range = range(0x800)
     lengths: range = ANY_DATA
 
@@ -65,19 +68,19 @@ STRIKES: Final[dict[str, Strike]] = {
     "pdo_long": Strike("frame", "pdo_long", _ONCE, ids=_PDOS, lengths=range(8)),
     "sdo_abort": Strike("frame", "sdo_abort", _ONCE, ids=_REQUESTS),
     "sdo_timeout": Strike("frame", "sdo_timeout", _ONCE, ids=_REQUESTS),
-    "lose-on": Strike("cycle", "lose", reach="life"),
+    "lose-on": Strike("cycle", "lose", reach="life", silences=True),
     "delay-on": Strike("cycle", "delay", {"delay_s": 0.1}, reach="life"),
     "duplicate-on": Strike("cycle", "duplicate", {"probability": 0.5}),
     "reorder-on": Strike("cycle", "reorder", {"probability": 0.2}),
     "corrupt-on": Strike("cycle", "corrupt", {"probability": 0.2}, reach="life", lies=True),
-    "pdo_short-on": Strike("cycle", "pdo_short", reach="sdo"),
+    "pdo_short-on": Strike("cycle", "pdo_short", reach="sdo", silences=True),
     "pdo_long-on": Strike("cycle", "pdo_long", reach="sdo"),
     "sdo_abort-on": Strike("cycle", "sdo_abort"),
     "sdo_timeout-on": Strike("cycle", "sdo_timeout"),
-    "node_reset": Strike("cycle", "node_reset", reach="life"),
-    "power_cycle": Strike("cycle", "power_cycle", {"for_s": 0.3}, reach="life"),
-    "silence": Strike("cycle", "silence", reach="life"),
-    "babbling": Strike("cycle", "babbling", {"for_s": 0.5}, reach="life"),
+    "node_reset": Strike("cycle", "node_reset", reach="life", silences=True),
+    "power_cycle": Strike("cycle", "power_cycle", {"for_s": 0.3}, reach="life", silences=True),
+    "silence": Strike("cycle", "silence", reach="life", silences=True),
+    "babbling": Strike("cycle", "babbling", {"for_s": 0.5}, reach="life", silences=True),
     "wrong_identity": Strike("cycle", "wrong_identity"),
     "emcy": Strike("cycle", "emcy"),
     "encoder_stuck": Strike("cycle", "encoder_stuck", lies=True),
