@@ -275,8 +275,7 @@ async def test_going_down_in_a_move_stops_the_motors() -> None:
 async def test_it_goes_down_at_the_very_moment_at_which_a_target_comes() -> None:
     async with running_robot(NXT, seed=3) as robot:
         (motors,) = robot.app.devices._motor_cycles
-        while not motors._given._waiters:
-            await asyncio.sleep(0.001)
+        await robot.until(lambda: bool(motors._given._waiters))
         motors._given.set()
         async with asyncio.timeout(2.0):
             await motors.close()
