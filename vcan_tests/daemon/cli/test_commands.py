@@ -123,6 +123,29 @@ def test_a_failure_has_its_exit_code_and_a_sentence_on_stderr(
     assert (out, told in err, "Traceback" in err) == ("", True, False)
 
 
+TAKEN = [
+    "steer front 3 --takeover --no-wait",
+    "motor velocity 1 5 --duration 0.01 --takeover",
+    "drive parallel --angle 0 --speed 0.3 --duration 0.01 --takeover",
+]
+
+
+@pytest.mark.usefixtures("server")
+@pytest.mark.parametrize("line", TAKEN)
+def test_a_motion_takes_the_robot_over_where_a_person_says_so(
+    backend: FakeBackend, capsys: pytest.CaptureFixture[str], line: str
+) -> None:
+    assert run(line) == 0
+    assert capsys.readouterr().err == "canhelm: taken over from somebody\n"
+    assert backend.taken == [backend.calls[0][2]]
+
+
+@pytest.mark.usefixtures("server")
+def test_a_motion_takes_nothing_over_unasked(backend: FakeBackend) -> None:
+    assert run("steer front 3 --no-wait") == 0
+    assert backend.taken == []
+
+
 @pytest.mark.usefixtures("server")
 def test_an_empty_argument_is_named_as_what_it_is(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["steer", "", "3"]) == 2
