@@ -17,7 +17,7 @@ from daemon.cli.output import Json, console, plain, say, show, wants_json, words
 from daemon.cli.pictures import can_draw
 
 if TYPE_CHECKING:
-    from daemon.campaigns.faults.course import Outcome
+    from daemon.campaigns.faults.outcome import Outcome
     from daemon.campaigns.faults.strikes import Injection
 
 SHOWN = 20

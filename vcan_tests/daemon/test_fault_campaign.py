@@ -10,8 +10,8 @@ import pytest
 
 from canhelm.errors import ConfigError, UsageError
 from daemon.campaigns.faults import course, plan
-from daemon.campaigns.faults.course import MANOEUVRES, Outcome
 from daemon.campaigns.faults.limits import Limits, limits_of
+from daemon.campaigns.faults.outcome import MANOEUVRES, Outcome
 from daemon.campaigns.faults.plan import injection_of, named, planned
 from daemon.campaigns.faults.points import Point, note_points, try_all, try_one
 from daemon.campaigns.faults.results import LINES, SUMMARY, opened, table, write_summary

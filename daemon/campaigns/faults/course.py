@@ -9,12 +9,12 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Any, Final, Protocol
 
 from canhelm.errors import CanhelmError, Refused
 from daemon.campaigns.faults.judge import LATCHED, Judge
 from daemon.campaigns.faults.limits import limits_of
+from daemon.campaigns.faults.outcome import MANOEUVRES, Outcome
 from daemon.campaigns.faults.strikes import STRIKES, Injection, fault_of, names_of, part_of
 from daemon.demo_robot import DemoRobot
 from daemon.runtime.vehicle import VehicleState
@@ -25,7 +25,6 @@ from drivers.simulated.faults import Faults
 from profiles.loader import load
 
 ROBOT: Final = "max2d"
-MANOEUVRES: Final = ("boot", "steer", "drive", "stop")
 STEERED_DEG: Final = 4.0
 STEERED: Final = {"rear_deg": 0.0, "front_deg": STEERED_DEG}
 SPEED_M_S: Final = 0.3
@@ -61,34 +60,6 @@ class Points(Protocol):
 
     def done(self, outcome: Outcome) -> None:
         """What has struck has been judged."""
-
-
-@dataclass(slots=True)
-class Outcome:
-    """What became of one injection.
-
-    Attributes:
-        strike, index: of the injection.
-        manoeuvre: that was under way.
-        part: the device that it concerned; None for all.
-        at_s: virtual time.
-        stopped: whether it ended the manoeuvre by an error, or latched a stop.
-        told: what the client was told, or the status said.
-        rest_s: from the injection until the last wheel stood, where it stopped a robot that moved.
-        recovered: by which action: ``nothing``, ``reset``; "" where it did not recover.
-        violations: what was wrong, by invariant.
-    """
-
-    strike: str
-    index: int
-    manoeuvre: str
-    part: str | None = None
-    at_s: float = 0.0
-    stopped: bool = False
-    told: str = ""
-    rest_s: float | None = None
-    recovered: str = ""
-    violations: dict[str, str] = field(default_factory=dict)
 
 
 class Course:

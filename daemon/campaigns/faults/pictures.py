@@ -8,7 +8,7 @@ from typing import Final
 
 import matplotlib as mpl
 
-from daemon.campaigns.faults.course import MANOEUVRES, Outcome
+from daemon.campaigns.faults.outcome import MANOEUVRES, Outcome
 from daemon.campaigns.faults.strikes import STRIKES
 
 mpl.use("Agg")

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from canhelm.errors import UsageError
-from daemon.campaigns.faults.course import MANOEUVRES
+from daemon.campaigns.faults.outcome import MANOEUVRES
 from daemon.campaigns.faults.points import Point
 from daemon.campaigns.faults.strikes import STRIKES, Injection, Strike
 

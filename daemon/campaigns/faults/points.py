@@ -19,7 +19,8 @@ from typing import Final
 
 import msgspec
 
-from daemon.campaigns.faults.course import Course, Outcome, Points
+from daemon.campaigns.faults.course import Course, Points
+from daemon.campaigns.faults.outcome import Outcome
 from daemon.campaigns.faults.strikes import STRIKES, Injection, Where
 from daemon.runtime.clock import run_virtual
 

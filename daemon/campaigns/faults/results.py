@@ -18,7 +18,7 @@ import msgspec
 
 from canhelm import __version__
 from canhelm.errors import ConfigError
-from daemon.campaigns.faults.course import MANOEUVRES, Outcome
+from daemon.campaigns.faults.outcome import MANOEUVRES, Outcome
 from daemon.campaigns.faults.strikes import STRIKES, Injection
 from daemon.campaigns.results import appended, whole_lines
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from multiprocessing.connection import Connection, wait
 
 from canhelm.errors import CanhelmError
-from daemon.campaigns.faults.course import Outcome
+from daemon.campaigns.faults.outcome import Outcome
 from daemon.campaigns.faults.points import try_all
 from daemon.campaigns.faults.strikes import Injection
 
