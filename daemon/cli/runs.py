@@ -74,6 +74,29 @@ def delete(*names: str, folder: Folder = None, robot: Robot = None) -> None:
         say(f"run {run.number} of {run.robot} is deleted")
 
 
+@runs.command
+def export(
+    name: str = LAST,
+    /,
+    *,
+    mcap: Annotated[Path, Parameter(help="The file to write, which must not be there yet.")],
+    folder: Folder = None,
+    robot: Robot = None,
+    json: Json = None,
+) -> None:
+    """Write a run as one MCAP file, which Foxglove, PlotJuggler and Rerun open.
+
+    Example: `canhelm runs export last --mcap run.mcap`
+
+    Args:
+        name: Number of a run, or last.
+    """
+    from daemon.runs.mcap_file import write_mcap
+
+    run = store.choose(find_runs(folder, robot), name)
+    show({"run": run.number, "file": str(mcap), "messages": write_mcap(run, mcap)}, json=json)
+
+
 def find_runs(folder: str | None, robot: str | None) -> list[Run]:
     """The runs among which a person chooses, oldest first. Raises UsageError or ConfigError."""
     return store.read_runs(store.all_folders(_folder(folder), os.environ), robot)
