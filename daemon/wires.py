@@ -25,19 +25,25 @@ from drivers.epos.first_look import FirstLook
 from drivers.epos.serial_bus import SerialGatewayBus
 from drivers.epos.serial_conversation import Transport
 from drivers.epos.serial_first_look import first_look_over
+from drivers.epos.serial_frames_v2 import StuffedExchange
+from drivers.epos.serial_handshake import Exchange, Handshake
 from drivers.epos.serial_plan import facts, gateway_of, serial_profile
 from drivers.epos.serial_tty import BAUD_RATES, SerialTty, require_serial_device
 from drivers.simulated.bus import SimulatedBus
 from drivers.simulated.network import SimulatedNetwork
 from drivers.simulated.serial import SimulatedSerial
+from drivers.simulated.serial_later import SimulatedLaterSerial
 from drivers.simulated.serial_wire import SerialCable, SerialPty
 from profiles.schema import Profile
 
 DEFAULT_BAUD = 115200
 READING_SHARE = 0.8
 """Of the longest cycle over a serial line, what its readings may take."""
-_RS232 = re.compile(r"rs232(?P<colon>:(?P<device>[^@]*))?(?:@(?P<baud>.*))?")
+_RS232 = re.compile(r"rs232(?P<colon>:(?P<device>[^@,]*))?(?:@(?P<baud>[^,]*))?(?:,(?P<framing>.*))?")
+LATER_FRAMING = "epos2"
+"""The framing of later drives on a serial line, behind a comma."""
 OnLost = Callable[[str], None]
+MakeExchange = Callable[[int], Exchange]
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +74,8 @@ def make_wire(spec: str, profile: Profile, seed: int, built: Profile | None = No
     """The way to a robot that a SPEC names.
 
     Args:
-        spec: ``simulated``; ``rs232`` for a simulated drive on a simulated serial line; ``rs232:DEVICE[@BAUD]``;
+        spec: ``simulated``; ``rs232`` for a simulated drive on a simulated serial line; ``rs232:DEVICE[@BAUD]``,
+            either with ``,epos2`` behind it for a gateway with the framing of later drives;
             ``INTERFACE:CHANNEL`` of python-can; for a robot with nothing on CAN ``serial:DEVICE`` or ``usb`` for its
             brick, or ``none`` for all bricks as the profile says.
         profile: the robot. Without any device a serial line is not opened: :func:`look_over_line` comes first.
@@ -115,16 +122,16 @@ def _bus_wire(spec: str, profile: Profile, seed: int, built: Profile) -> Wire:
         raise UsageError(
             f"robot {profile.name} has no EPOS that {spec} could be the line of", value=spec, remedy=remedy
         )
-    baud = _baud(spec, serial["baud"])
+    baud, make_exchange = _baud(spec, serial["baud"]), _framing(spec, serial["framing"])
     if serial["colon"] is None:
-        return _simulated_serial(profile, baud, seed, built)
+        return _simulated_serial(profile, baud, make_exchange, seed, built)
     if not serial["device"]:
         remedy = f"give rs232:/dev/ttyS0@{baud}, or rs232@{baud} for a simulated line"
         raise UsageError(f"{spec!r} names no serial device", value=spec, remedy=remedy)
     require_serial_device(serial["device"])
     if not profile.drives:
         return Wire(NoBus(profile.network.bit_rate), profile)
-    return _serial_wire(serial["device"], partial(_open_device, serial["device"], baud), profile, baud)
+    return _serial_wire(serial["device"], partial(_open_device, serial["device"], baud), profile, baud, make_exchange)
 
 
 def _baud(spec: str, text: str | None) -> int:
@@ -138,6 +145,14 @@ def _baud(spec: str, text: str | None) -> int:
     return baud
 
 
+def _framing(spec: str, text: str | None) -> MakeExchange:
+    """How requests and answers go over the line. Raises UsageError."""
+    if text not in (None, LATER_FRAMING):
+        remedy = f"leave it out for an EPOS 24/5, or give {LATER_FRAMING}"
+        raise UsageError(f"{text!r} in {spec!r} is no framing of a serial line", value=spec, remedy=remedy)
+    return Handshake if text is None else StuffedExchange
+
+
 def _can_wire(bus: Bus, profile: Profile) -> Wire:
     """On the kernel's CAN the kernel sends SYNC, where it can, and SYNC paces the cycle."""
     if isinstance(bus, SocketCanBus) and kernel_repeats():
@@ -145,11 +160,13 @@ def _can_wire(bus: Bus, profile: Profile) -> Wire:
     return Wire(bus, profile)
 
 
-def _simulated_serial(profile: Profile, baud: int, seed: int, built: Profile) -> Wire:
+def _simulated_serial(profile: Profile, baud: int, make_exchange: MakeExchange, seed: int, built: Profile) -> Wire:
     medium = SimulatedBus(bit_rate=profile.network.bit_rate, name="vcan0")
     network = SimulatedNetwork(built, medium, seed)
-    port = SimulatedSerial(network.drives[gateway_of(profile)], baud, seed=seed)
-    return _serial_wire("rs232", partial(_open_cable, port.cable), profile, baud, network, medium, port.cable)
+    gateway = network.drives[gateway_of(profile)]
+    make_port = SimulatedSerial if make_exchange is Handshake else SimulatedLaterSerial
+    cable = make_port(gateway, baud, seed=seed).cable
+    return _serial_wire("rs232", partial(_open_cable, cable), profile, baud, make_exchange, network, medium, cable)
 
 
 def _serial_wire(
@@ -157,6 +174,7 @@ def _serial_wire(
     connect: Callable[[OnLost], Transport],
     profile: Profile,
     baud: int,
+    make_exchange: MakeExchange,
     network: SimulatedNetwork | None = None,
     medium: SimulatedBus | None = None,
     cable: SerialCable | None = None,
@@ -166,7 +184,7 @@ def _serial_wire(
     gateway = profile.drives[gateway_of(profile)].node
     inputs = frozenset(drive.node for drive in profile.drives.values() if drive.emergency_stop)
     bus = SerialGatewayBus(
-        name, connect, baud, profile.network.bit_rate, gateway, encoders, inputs, facts(profile, baud)
+        name, connect, baud, make_exchange, profile.network.bit_rate, gateway, encoders, inputs, facts(profile, baud)
     )
     late = shrunk.network.late_after_cycles
     return Wire(
@@ -184,11 +202,11 @@ async def look_over_line(spec: str) -> FirstLook:
     """What the drive on a serial line says of itself. Raises BusOff, Timeout, Aborted or Refused."""
     serial = _RS232.fullmatch(spec)
     assert serial is not None
-    device, baud = serial["device"], _baud(spec, serial["baud"])
+    device, baud, make_exchange = serial["device"], _baud(spec, serial["baud"]), _framing(spec, serial["framing"])
     port = SerialTty(device, baud)
     port.open()
     try:
-        return await first_look_over(port, baud, device)
+        return await first_look_over(port, make_exchange(baud), baud, device)
     finally:
         port.close()
 

@@ -17,6 +17,7 @@ from daemon.cli.demo_semitrailer import demo_semitrailer
 from daemon.cli.demo_view import DemoView
 from daemon.cli.output import Json, say, show, words
 from daemon.cli.pictures import can_draw
+from daemon.cli.run import simulates
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -83,7 +84,7 @@ def demo(
     robot = load(profile or ("turtle" if turtle else "max2d")).profile
     if turtle and bus != "simulated":
         raise UsageError("the accelerometer needs CAN", value=bus, remedy="leave --bus out")
-    if bus.partition("@")[0] not in ("simulated", "rs232"):
+    if not simulates(bus):
         raise UsageError(
             f"the demo simulates its network, on {bus!r} it cannot", remedy="--bus simulated or --bus rs232"
         )

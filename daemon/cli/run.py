@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import faulthandler
 import os
+import re
 import signal
 import sys
 from collections.abc import Callable, Coroutine, Iterable
@@ -243,4 +244,4 @@ def _bus(bus: str | None, *, simulate: bool) -> str:
 
 def simulates(bus: str) -> bool:
     """Whether a bus SPEC means a simulated network."""
-    return bus.partition("@")[0] in ("simulated", "rs232")
+    return re.split("[@,]", bus)[0] in ("simulated", "rs232")

@@ -34,6 +34,7 @@ from drivers.epos.serial_frames import (
     make_send_nmt,
     make_write_object,
 )
+from drivers.epos.serial_handshake import Exchange
 from drivers.epos.serial_line import SerialLine
 from drivers.epos.serial_reading import OnData, Readings
 from drivers.epos.serial_sdo import SILENT, SdoBridge
@@ -58,6 +59,7 @@ class SerialGatewayBus(Bus):
         connect: makes the transport, on the running loop; it calls its argument with the reason when the device
             vanishes. Raises BusOff where the device is missing.
         baud: bit/s of the line.
+        make_exchange: from the baud rate, how one request and its answer go over the line.
         bit_rate: bit/s of the CAN bus behind it.
         gateway: node id of the drive on the line.
         encoders: object dictionaries of the encoders by node id; all other nodes are drives.
@@ -75,6 +77,7 @@ class SerialGatewayBus(Bus):
         name: str,
         connect: Callable[[Callable[[str], None]], Transport],
         baud: int,
+        make_exchange: Callable[[int], Exchange],
         bit_rate: int,
         gateway: int,
         encoders: Mapping[int, ObjectTable],
@@ -89,6 +92,7 @@ class SerialGatewayBus(Bus):
         self.on_idle: Callable[[], None] | None = None
         self._under_way = 0
         self._connect = connect
+        self._make_exchange = make_exchange
         self._encoders = encoders
         self._facts = facts
         self._bridges: dict[int, SdoBridge] = {}
@@ -109,7 +113,8 @@ class SerialGatewayBus(Bus):
     async def open(self) -> None:
         """Open the line. Raises BusOff where its device is missing."""
         if self.line is None:
-            self.line = SerialLine(self._connect(self._on_lost), self.baud, self.name)
+            exchange = self._make_exchange(self.baud)
+            self.line = SerialLine(self._connect(self._on_lost), self.baud, self.name, exchange)
 
     def _on_lost(self, reason: str) -> None:
         """The device has vanished: everything fails until it is back, which is tried once a second."""

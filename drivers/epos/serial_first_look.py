@@ -7,6 +7,7 @@ from drivers.epos.first_look import FirstLook, first_look
 from drivers.epos.objects import OBJECTS
 from drivers.epos.serial_conversation import Transport
 from drivers.epos.serial_frames import make_read_object
+from drivers.epos.serial_handshake import Exchange
 from drivers.epos.serial_line import SerialLine
 
 ITSELF = 0
@@ -14,11 +15,12 @@ ITSELF = 0
 NODE_MASK = 0x7F
 
 
-async def first_look_over(transport: Transport, baud: int, name: str) -> FirstLook:
+async def first_look_over(transport: Transport, exchange: Exchange, baud: int, name: str) -> FirstLook:
     """Look at the drive on a line; its identifier for SDO tells its node id, whichever switches have set it.
 
     Args:
         transport: an open line.
+        exchange: how one request and its answer go over it.
         baud: bit/s of the line.
         name: the device, for people.
 
@@ -26,7 +28,7 @@ async def first_look_over(transport: Transport, baud: int, name: str) -> FirstLo
         Refused: it is no EPOS 24/5.
         BusOff, Timeout, Aborted: the drive does not answer, or lacks an object.
     """
-    line = SerialLine(transport, baud, name)
+    line = SerialLine(transport, baud, name, exchange)
 
     async def read(entry: ObjectDef) -> int:
         answer = await line.request(make_read_object(ITSELF, entry.index, entry.sub))

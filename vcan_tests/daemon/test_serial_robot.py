@@ -32,6 +32,13 @@ async def test_it_boots_and_steers_to_within_a_degree() -> None:
         assert math.degrees(robot.network.world.heading_rad("front")) == pytest.approx(30.0, abs=1.0)
 
 
+async def test_behind_a_gateway_with_the_framing_of_later_drives_it_boots_and_steers_likewise() -> None:
+    async with running_robot(bus="rs232,epos2") as robot:
+        steered = await robot.call("steer", pair="front", angle_deg=30.0)
+        assert steered["steering_error_deg"] <= 1.0
+        assert math.degrees(robot.network.world.heading_rad("front")) == pytest.approx(30.0, abs=1.0)
+
+
 async def test_figure_4_16_has_its_radius_within_eight_percent() -> None:
     async with running_robot(bus="rs232") as robot:
         speed = robot.app.profile.limits.speed_m_s

@@ -22,6 +22,12 @@ async def test_a_simulated_robot_of_a_brick_alone_has_no_can() -> None:
     assert make_wire("simulated", load("nxt").profile, 0).bus.name == "none"
 
 
+def test_a_framing_that_nobody_speaks_is_refused() -> None:
+    with pytest.raises(UsageError, match="'epos7' in 'rs232:/dev/ttyS9@115200,epos7' is no framing") as refused:
+        make_wire("rs232:/dev/ttyS9@115200,epos7", MAX2D, 0)
+    assert refused.value.remedy == "leave it out for an EPOS 24/5, or give epos2"
+
+
 @pytest.mark.parametrize("spec", ["rs232:", "rs232:@115200"])
 def test_a_device_that_is_left_out_is_told_with_both_meanings(spec: str) -> None:
     with pytest.raises(UsageError, match="names no serial device") as refused:
