@@ -73,7 +73,7 @@ def test_logs_beyond_their_limits_are_complained_of(change: dict[str, int]) -> N
 
 
 def test_a_table_has_a_row_an_hour_and_the_ends() -> None:
-    assert [row["hours"] for row in table(lived(2.5))] == [0.0, 1.0, 2.0, 2.5]
+    assert [row["hours"] for row in table(lived(2.5))] == ["0.00", "1.00", "2.00", "2.50"]
 
 
 def test_a_picture_is_drawn(tmp_path: Path) -> None:

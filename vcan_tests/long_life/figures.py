@@ -6,7 +6,7 @@ import asyncio
 import gc
 import os
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -111,7 +111,16 @@ def table(samples: Sequence[Sample]) -> list[dict[str, Any]]:
 
 
 def _row(sample: Sample) -> dict[str, Any]:
-    return {"hours": round(sample.time_s / 3600.0, 2), **asdict(sample)}
+    return {
+        "hours": f"{sample.time_s / 3600.0:.2f}",
+        "MiB": f"{sample.memory_kib / 1024:.1f}",
+        "objects": sample.objects,
+        "tasks": sample.tasks,
+        "descriptors": sample.descriptors,
+        "record MB": f"{sample.log_bytes / 1e6:.1f}",
+        "runs MB": f"{sample.run_bytes / 1e6:.1f}",
+        "faults": sample.faults,
+    }
 
 
 def draw(samples: Sequence[Sample], path: Path) -> None:
