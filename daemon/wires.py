@@ -25,8 +25,8 @@ from drivers.epos.first_look import FirstLook
 from drivers.epos.serial_bus import SerialGatewayBus
 from drivers.epos.serial_conversation import Transport
 from drivers.epos.serial_first_look import first_look_over
-from drivers.epos.serial_frames_v2 import StuffedExchange
 from drivers.epos.serial_handshake import Exchange, Handshake
+from drivers.epos.serial_handshake_v2 import StuffedExchange
 from drivers.epos.serial_plan import facts, gateway_of, serial_profile
 from drivers.epos.serial_tty import BAUD_RATES, SerialTty, require_serial_device
 from drivers.simulated.bus import SimulatedBus

@@ -10,9 +10,7 @@ from __future__ import annotations
 from binascii import crc_hqx
 from collections.abc import Iterator
 
-from drivers.epos.serial_answers import Answer, parse_answer
-from drivers.epos.serial_frames import UNANSWERED, Frame
-from drivers.epos.serial_handshake import Exchange, Outcome, Phase
+from drivers.epos.serial_frames import Frame
 
 DLE, STX = 0x90, 0x02
 _START, _DLE, _DLE_DLE = bytes((DLE, STX)), bytes((DLE,)), bytes((DLE, DLE))
@@ -76,42 +74,3 @@ class Deframer:
             yield "CRC wrong"
         else:
             yield Frame(body[0], body[2:-2])
-
-
-class StuffedExchange(Exchange):
-    """The host's side of one exchange: one frame out, one frame back, nothing in between."""
-
-    def __init__(self, baud: int) -> None:
-        super().__init__(baud)
-        self._deframer = Deframer()
-
-    def begin(self, request: bytes, now_s: float) -> bytes:
-        """Begin an exchange with a frame of the first generation; the bytes to send at ``now_s``."""
-        self._request = request
-        self.outcome = None
-        self.phase = Phase.SENDING if request[0] in UNANSWERED else Phase.ANSWER
-        self._deframer = Deframer()
-        return self._say(restuffed(request), now_s)
-
-    def feed(self, data: bytes, stamp_s: float) -> bytes:
-        """Take bytes of the drive; there is nothing to say to them."""
-        for frame in self._deframer.feed(data):
-            answer = frame if isinstance(frame, str) else parse_answer(self._request, frame)
-            if self.outcome is not None or stamp_s < self.sent_s:
-                self.strays += 1
-            elif isinstance(answer, str):
-                self.crc_errors += 1
-                self.outcome = Outcome.GARBLED
-            else:
-                self.answer = answer
-                self.outcome = Outcome.ANSWERED
-        return b""
-
-    def give_up(self, now_s: float) -> bytes:
-        """No answer came in time; nobody acknowledges a command without answer, so it counts as carried out."""
-        if self.phase is Phase.SENDING:
-            self.answer = Answer()
-            self.outcome = Outcome.ANSWERED
-        else:
-            self.outcome = Outcome.LOST
-        return b""

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from canhelm.errors import Timeout
 from drivers.epos.serial_answers import Answer, make_read_answer
 from drivers.epos.serial_frames import Frame, make_read_object, make_send_nmt, make_write_object
-from drivers.epos.serial_frames_v2 import DLE, Deframer, StuffedExchange, make_stuffed_frame, restuffed
+from drivers.epos.serial_frames_v2 import DLE, Deframer, make_stuffed_frame, restuffed
+from drivers.epos.serial_handshake_v2 import StuffedExchange
 from drivers.epos.serial_line import SerialLine
 
 BAUD = 115200

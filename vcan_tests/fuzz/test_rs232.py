@@ -29,8 +29,9 @@ from drivers.epos.serial_frames import (
     make_send_nmt,
     make_write_object,
 )
-from drivers.epos.serial_frames_v2 import StuffedExchange, restuffed
+from drivers.epos.serial_frames_v2 import restuffed
 from drivers.epos.serial_handshake import Exchange, Handshake
+from drivers.epos.serial_handshake_v2 import StuffedExchange
 from drivers.epos.serial_line import SerialLine
 from vcan_tests.drivers import serial_bench
 from vcan_tests.drivers.serial_bench import BAUD, BYTE_S
