@@ -46,6 +46,7 @@ WAY_OFF_M: Final = 0.02
 """How far a manoeuvre that is told to be done may be from its end: slip, settling and rounding."""
 BUS_WORDS: Final = ("no node answers", "vcan0")
 """How the daemon names what concerns the whole bus."""
+BABBLING: Final = "babbling"
 COMMANDED: Final = ("stop", "estop", "client_gone")
 
 
@@ -284,11 +285,11 @@ class Course:
     def _is_named(self, outcome: Outcome, error: CanhelmError | None) -> bool:
         """Whether what is told names the device that was struck, or the bus, and says what to do.
 
-        What a person commanded names itself.
+        What a person commanded names itself; nobody can tell whose frames they are that fill a bus.
         """
         if outcome.strike in COMMANDED:
             return bool(outcome.told)
-        names = names_of(outcome.part, self._app.profile)
+        names = () if outcome.strike == BABBLING else names_of(outcome.part, self._app.profile)
         named = not names or any(word in outcome.told for word in (*names, *BUS_WORDS))
         return bool(outcome.told) and named and (error is None or bool(error.remedy))
 
