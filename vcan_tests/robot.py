@@ -12,6 +12,7 @@ from typing import Any
 from canhelm.errors import CanhelmError
 from daemon.app import App
 from daemon.runs.store import RunStore
+from drivers.contract import BrakeState
 from drivers.simulated.network import SimulatedNetwork
 from profiles.loader import load
 from profiles.schema import Profile
@@ -82,6 +83,11 @@ class Robot:
             self.app.supervisor.observers.remove(look)
         return loop.time() - begin
 
+    def is_ready(self) -> bool:
+        """Whether everything can be commanded."""
+        loose = (BrakeState.UNKNOWN, BrakeState.ENGAGING)
+        return self.state == "idle" and not any(b.state in loose for b in self.app.devices.brakes.values())
+
     @property
     def state(self) -> str:
         """The vehicle's state."""
@@ -123,7 +129,7 @@ async def running_robot(
 
     Args:
         bus: the SPEC of the wire.
-        booted: wait until it is idle.
+        booted: wait until it is idle, its steering brakes known to be engaged.
         expect_errors: the test breaks something; logged errors and faults are its subject.
     """
     handler = _Collector()
@@ -134,7 +140,7 @@ async def running_robot(
     await app.start()
     try:
         if booted:
-            await robot.until(lambda: robot.state == "idle")
+            await robot.until(robot.is_ready)
         yield robot
     finally:
         await robot.hang_up()

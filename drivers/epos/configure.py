@@ -101,13 +101,17 @@ class EposSetup:
             )
 
     async def _stop(self) -> None:
-        """Life guarding off while nobody guards; a drive that still turns is brought to rest by its ramp, then off."""
-        await self._written.write(((OBJECTS["life_time_factor"], 0), (OBJECTS["guard_time"], 0)))
+        """A drive that still turns is brought to rest by its ramp, then off; no life guarding while nobody guards.
+
+        Its life guarding stays until it has been told to stop: nothing else stops it where it can be told no more.
+        """
         state = state_of(await self._sdo.read_int(OBJECTS["statusword"]))
-        if state is not None and state.power_stage_on:
-            await self._sdo.write(OBJECTS["controlword"], Command.QUICK_STOP)
+        powered = state is not None and state.power_stage_on
+        await self._sdo.write(OBJECTS["controlword"], Command.QUICK_STOP if powered else Command.DISABLE_VOLTAGE)
+        await self._written.write(((OBJECTS["life_time_factor"], 0), (OBJECTS["guard_time"], 0)))
+        if powered:
             await asyncio.sleep(self._config.max_speed_m_s / self._config.quick_stop_m_s2)
-        await self._sdo.write(OBJECTS["controlword"], Command.DISABLE_VOLTAGE)
+            await self._sdo.write(OBJECTS["controlword"], Command.DISABLE_VOLTAGE)
 
     async def _clear_errors(self) -> None:
         await self._sdo.write(OBJECTS["controlword"], Command.FAULT_RESET)

@@ -42,6 +42,21 @@ async def test_a_drive_that_hears_nothing_does_not_push_on_alone_when_the_others
         assert _powered(robot) == []
 
 
+async def test_a_turning_drive_that_is_configured_again_and_does_not_answer_stops_by_life_guarding() -> (
+    None
+):
+    async with running_robot(expect_errors=True) as robot:
+        driving = robot.begin("drive.parallel", angle_deg=0.0, speed_m_s=0.3, duration_s=5.0)
+        await robot.until(lambda: robot.speed_m_s > 0.28)
+        await robot.call("simulation.fault", kind="sdo_timeout", part="front_left", object="0x6041")
+        await robot.call("simulation.fault", kind="lose", cob_id=0x703)
+        await robot.until(lambda: robot.state == "fault", 0.5)
+        await asyncio.sleep(1.0)
+        assert robot.fastest_wheel_m_s < 0.01
+        assert not robot.network.drives["front_left"].motion.powered
+        await driving
+
+
 async def test_a_wheel_that_does_not_brake_is_switched_off_soon_after_its_ramp_should_be_over() -> None:
     async with running_robot(expect_errors=True) as robot:
         driving = robot.begin("drive.parallel", angle_deg=0.0, speed_m_s=0.3, duration_s=5.0)
