@@ -217,6 +217,7 @@ class Course:
         self.outcome = Outcome(injection.strike, injection.index, self._manoeuvre, part, self._loop.time())
         strike, judge = STRIKES[injection.strike], self.judge
         wild = strike.kind.startswith("encoder_") and part in self._app.profile.drives
+        judge.blocked = strike.kind == "motor_blocked"
         judge.strike(strike.reach, wild=wild, silences=strike.silences)
         cut_off = part is None and strike.reach == "life"
         brakes = self._app.profile.brakes.items()

@@ -33,6 +33,7 @@ class Judge:
         violations: what was wrong, a sentence for each invariant, by the invariant.
         live: whether a command may move anything now.
         reach: how drives hear of a stop, as far as is known.
+        blocked: whether a wheel is held, so that the others are wound up.
         wild: whether a drive's own readings are wrong, so that it cannot keep its speed.
         deaf: brakes that cannot be told, or do not obey.
     """
@@ -42,7 +43,7 @@ class Judge:
         self.violations: dict[str, str] = {}
         self.live = False
         self.reach: Reach = "pdo"
-        self.wild = False
+        self.wild = self.blocked = False
         self.deaf: frozenset[str] = frozenset()
         self._app, self._limits = app, limits
         self._network: SimulatedNetwork = app.network
@@ -161,7 +162,7 @@ class Judge:
             rolled_m = self._rolled_m()
             self._rested_m = self._rested_m or rolled_m
             further_m = _farthest_m(rolled_m, self._rested_m)
-            if further_m > self._limits.settling_m:
+            if further_m > (self._limits.wound_up_m if self.blocked else self._limits.settling_m):
                 self.violated("rest", f"a wheel has gone on for {further_m * 1e3:.1f} mm without a live command")
         if now_s > self._off_by_s and (powered := self._powered()):
             self.violated("torque", f"{', '.join(powered)} has power without a live command")

@@ -22,6 +22,8 @@ SWING_S: Final = 0.08
 SETTLING_M: Final = 0.008
 """What a wheel may turn after that, as torque goes or comes: 1.3 mm where nothing else is wrong (docs/service.md), more
 where drives have worked against each other (docs/fault-campaign.md)."""
+WOUND_UP_M: Final = 0.02
+"""Likewise where a wheel is blocked, and the others have pushed against it at the limit of their current."""
 OFF_CYCLES: Final = 8
 """Control cycles in which drives that hear their PDOs are switched off: command, SYNC, answer, a frame that was lost;
 once more where a second stop cuts in."""
@@ -36,6 +38,7 @@ class Limits:
     Attributes:
         at_rest_m_s: rim speed that counts as rest (``daemon/runtime/rest.py``).
         settling_m: way of a rim that is no motion any more.
+        wound_up_m: likewise where a wheel is blocked.
         fastest_m_s: of a rim, whatever is wrong (``limits.wheel_speed_m_s``).
         steering_m_s: of a rim that turns a pair (``limits.steering_rim_speed_m_s``).
         heading_rad: of a pair, whatever is wrong (``limits.heading_deg``).
@@ -58,6 +61,7 @@ class Limits:
 
     at_rest_m_s: float
     settling_m: float
+    wound_up_m: float
     fastest_m_s: float
     steering_m_s: float
     heading_rad: float
@@ -92,6 +96,7 @@ def limits_of(profile: Profile) -> Limits:
     return Limits(
         at_rest_m_s=AT_REST_M_S,
         settling_m=SETTLING_M,
+        wound_up_m=WOUND_UP_M,
         fastest_m_s=limits.wheel_speed_m_s,
         steering_m_s=limits.steering_rim_speed_m_s,
         heading_rad=math.radians(limits.heading_deg),
