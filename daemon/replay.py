@@ -66,7 +66,7 @@ async def replay(profile: Profile, log: Iterable[LogFrame], every_s: float) -> R
             if now_s >= next_s:
                 next_s = now_s + every_s
                 replayed.rows.append(
-                    {"time_s": round(now_s, 6), **vehicle.status().get("odometry", {}), **_read(devices)}
+                    {"time_s": round(now_s, 6), **vehicle.status().get("odometry", {}), **_read(devices, profile)}
                 )
         bus.receiver(frame.can_id, frame.data, now_s)
     replayed.read = replayed.frames - master.counters.unknown
@@ -74,14 +74,14 @@ async def replay(profile: Profile, log: Iterable[LogFrame], every_s: float) -> R
     return replayed
 
 
-def _read(devices: Devices) -> dict[str, Any]:
-    """The newest reading of each device by its name."""
+def _read(devices: Devices, profile: Profile) -> dict[str, Any]:
+    """The newest reading of each device by its name; currents are positive where the motor pushes forward."""
     readings: dict[str, Any] = {}
     for name, drive in devices.drives.items():
         readings |= {
             f"{name}.state": str(drive.state),
             f"{name}.speed_m_s": round(drive.speed_m_s, 4),
-            f"{name}.current_a": round(drive.current_a, 3),
+            f"{name}.current_a": round(profile.drives[name].direction * drive.current_a, 3),
         }
     for name, encoder in devices.encoders.items():
         readings[f"{name}.heading_deg"] = round(math.degrees(encoder.heading_rad), 3)

@@ -28,7 +28,7 @@ def replay(file: Path, /, *, profile: str | None = None, every: float = 0.1, jso
     Example: `canhelm replay ~/.local/state/canhelm/max2d/runs/0001/frames.log --json`
 
     Args:
-        file: A log as `candump -L`, `canhelm run --record` and runs have it, or the `records.jsonl` of a fault.
+        file: A log as `candump -L`, `canhelm run --record` and runs have it, or the records of a fault.
         profile: The robot whose log it is; the default is max2d, and for a fault the profile beside it.
         every: Least time between two rows in seconds; 0 for one a SYNC.
     """
@@ -38,16 +38,16 @@ def replay(file: Path, /, *, profile: str | None = None, every: float = 0.1, jso
 
     if not every >= 0.0:
         raise UsageError(f"--every {every:g} is no time", remedy="give seconds, 0 for every SYNC")
-    records = file.name == RECORDS
-    robot = load(profile or (str(file.with_name(PROFILE)) if records else "max2d")).profile
+    records = _records(file) if _is_records(file) else None
+    robot = load(profile or ("max2d" if records is None else _profile_beside(file))).profile
     if robot.bricks:
         raise UsageError(
             f"robot {robot.name} has a brick, of which a log of CAN says nothing",
             value=robot.name,
             remedy="name the robot whose log it is, by --profile; `canhelm plot` draws a run of this one",
         )
-    if records:
-        return _compute_again(robot, file, json)
+    if records is not None:
+        return _compute_again(robot, records, json)
     replayed = run_virtual(decode(robot, _frames(file), every))
     say(f"{replayed.frames} frames, of which the daemon reads {replayed.read}; {replayed.malformed} malformed")
     rows = sorted([*replayed.rows, *replayed.events], key=lambda row: float(row["time_s"]))
@@ -55,14 +55,37 @@ def replay(file: Path, /, *, profile: str | None = None, every: float = 0.1, jso
     return 0
 
 
-def _compute_again(robot: Profile, file: Path, json: Json) -> int:
+def _is_records(file: Path) -> bool:
+    """Whether a file is for records of cycles: by its name, or as its first line begins as JSON does."""
+    if file.name == RECORDS or not file.is_file():
+        return file.name == RECORDS
+    try:
+        with file.open("rb") as content:
+            return content.read(1) == b"{"
+    except OSError:
+        return False  # whoever reads it next tells why it cannot be
+
+
+def _records(file: Path) -> list[bytes]:
+    try:
+        return file.read_bytes().splitlines()
+    except OSError as error:
+        raise UsageError(f"cannot read {file}: {error.strerror}", remedy="name the file of a fault's run") from error
+
+
+def _profile_beside(records: Path) -> str:
+    """The profile that a fault's run keeps beside its records. Raises UsageError where there is none."""
+    beside = records.with_name(PROFILE)
+    if not beside.exists():
+        remedy = "name the robot whose records they are, by --profile"
+        raise UsageError(f"there is no {PROFILE} beside {records}", value=str(beside), remedy=remedy)
+    return str(beside)
+
+
+def _compute_again(robot: Profile, lines: list[bytes], json: Json) -> int:
     from daemon.recompute import recompute
     from daemon.runtime.clock import run_virtual
 
-    try:
-        lines = file.read_bytes().splitlines()
-    except OSError as error:
-        raise UsageError(f"cannot read {file}: {error.strerror}", remedy="name the file of a fault's run") from error
     found = run_virtual(recompute(robot, lines))
     say(f"{found.cycles} cycles with a motion computed again; {found.left_out} others could not be")
     say("the first difference follows" if found.difference else "all commands are as they were recorded")

@@ -122,3 +122,20 @@ def test_another_profile_shows_where_it_would_have_been_driven_otherwise(
 def test_records_that_are_not_there_are_wrong_usage(tmp_path: Path, fault: Path) -> None:
     (tmp_path / PROFILE).write_bytes((fault / PROFILE).read_bytes())
     assert main(["replay", str(tmp_path / RECORDS)]) == 2
+
+
+def test_records_are_known_by_their_content_under_any_name(
+    fault: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy = tmp_path / "cut.jsonl"
+    copy.write_bytes((fault / RECORDS).read_bytes())
+    assert main(["replay", str(copy), "--profile", "max2d", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["difference"] is None
+
+
+def test_records_without_a_profile_beside_them_are_told_of_the_option(
+    fault: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / RECORDS).write_bytes((fault / RECORDS).read_bytes())
+    assert main(["replay", str(tmp_path / RECORDS)]) == 2
+    assert "--profile" in capsys.readouterr().err

@@ -10,6 +10,7 @@ import pytest
 from daemon.cli.main import main
 from daemon.replay import replay
 from daemon.runs.store import FRAMES, RunStore, read_runs
+from daemon.runs.table import read_table
 from daemon.runtime.clock import run_virtual
 from drivers.bus.candump import LogFrame, make_line, parse_line
 from profiles.loader import load
@@ -37,6 +38,15 @@ async def test_the_way_of_the_robot_is_found_again_in_the_frames(log: Path) -> N
     rows = (await replay(load("max2d").profile, frames(log), 0.0)).rows
     assert rows[-1]["x_m"] - rows[0]["x_m"] == pytest.approx(1.0, abs=0.01)
     assert max(row["rear_left.speed_m_s"] for row in rows) == pytest.approx(0.5, abs=0.02)
+
+
+async def test_currents_have_the_sign_of_the_run_and_push_forward_on_both_sides(log: Path) -> None:
+    recorded = read_table(read_runs([log.parents[1]])[0]).numbers
+    rows = (await replay(load("max2d").profile, frames(log), 0.0)).rows
+    for name in ("rear_left", "rear_right"):
+        column = f"{name}.current_a"
+        assert max(row[column] for row in rows) == pytest.approx(max(recorded[column]), abs=0.1)
+        assert max(recorded[column]) > 0.5
 
 
 async def test_a_healthy_log_has_nothing_malformed(log: Path) -> None:
