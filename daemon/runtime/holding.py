@@ -60,7 +60,10 @@ class Holding:
 
     def told(self) -> dict[str, Any] | None:
         """Who has the robot, for programs; None where nobody has."""
-        return self.leases.told(self.holder) if self.holder else None
+        if self.holder is not None:
+            return self.leases.told(self.holder)
+        handed = self._handed()
+        return {"client": handed} if handed else None
 
     def require_robot(self, lease: str | None) -> None:
         """Raise Refused where another lease than this one has the robot."""
@@ -75,13 +78,13 @@ class Holding:
         """Take the robot over: what others move comes to rest, and they move nothing while this lease lives.
 
         Returns:
-            Who had it, for people; None where nobody else had.
+            Who had it, for people: a client, or the daemon with what was handed to it; None where nobody else had.
 
         Raises:
             Refused: the lease has run out.
         """
         taker, holder = self.leases.client(lease), self.holder
-        before = self.leases.client(holder) if holder is not None and holder != lease else None
+        before = self.leases.client(holder) if holder not in (None, lease) else self._handed()
         self.leases.take(lease)
         if before is not None:
             self._log.add("warning", "supervisor", f"{taker} has taken the robot over from {before}")
@@ -97,6 +100,11 @@ class Holding:
         if motion.lease is None:
             return "handed to the daemon"
         return f"held by {self.leases.client(motion.lease)}" if self.leases.alive(motion.lease) else "coming to rest"
+
+    def _handed(self) -> str | None:
+        """The daemon with the motions that were handed to it, for people; None where there are none."""
+        handed = [f"motion {motion.identity}" for motion in self._motions.values() if motion.lease is None]
+        return f"the daemon ({', '.join(handed)})" if handed else None
 
     def _release(self, lease: str, reason: str) -> None:
         for motion in list(self._motions.values()):

@@ -130,12 +130,23 @@ async def test_the_robot_is_taken_back_from_who_took_it() -> None:
             await bob.call("drive.parallel", **DRIVE)
 
 
-async def test_a_takeover_ends_what_was_handed_to_the_daemon() -> None:
+async def test_a_takeover_ends_what_was_handed_to_the_daemon_and_an_event_says_so() -> None:
     async with two_people() as (robot, alice, bob):
+        events: list[dict[str, Any]] = []
+        robot.app.service.events.append(events.append)
         await alice.call("drive.parallel", **DRIVE | {"wait": False})
         await asyncio.sleep(1.0)
-        assert await bob.take() is None
+        assert await bob.take() == "the daemon (motion 1)"
+        assert "bob has taken the robot over from the daemon (motion 1)" in [event["message"] for event in events]
         assert robot.app.service.status()["motions"] == []
+
+
+async def test_the_status_tells_that_the_daemon_has_a_motion_that_was_handed_to_it() -> None:
+    async with two_people() as (robot, alice, _):
+        await alice.call("drive.parallel", **DRIVE | {"wait": False})
+        assert robot.app.service.status()["holder"] == {"client": "the daemon (motion 1)"}
+        await robot.app.service.call("stop", {}, None)
+        assert robot.app.service.status()["holder"] is None
 
 
 async def test_a_takeover_that_is_not_renewed_runs_out() -> None:
