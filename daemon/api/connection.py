@@ -32,6 +32,8 @@ MAX_UNSENT_BYTES = 1024 * 1024
 """Unsent bytes at which a client is dropped."""
 STALLED_S = 10.0
 """Time of lost samples on end after which a client is dropped."""
+FAREWELL_S = 0.2
+"""How long a client whose line was too long may still send, unheard: it reads its answer when it has sent all."""
 
 _numbers = itertools.count(1)
 
@@ -59,6 +61,7 @@ class Connection(asyncio.Protocol):
         self._name = f"client {next(_numbers)}"
         self._received = bytearray()
         self._handling = False
+        self._deaf = False
         self._malformed = 0
         self._meter = Meter(self._heard_s)
         self._lease: str | None = None
@@ -132,6 +135,8 @@ class Connection(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Bytes came in; the lines in them are handled a few at a time."""
+        if self._deaf:
+            return
         self._received += data
         self._heard_s = asyncio.get_running_loop().time()
         if not self._handling:
@@ -143,6 +148,9 @@ class Connection(asyncio.Protocol):
             end = self._received.find(b"\n")
             if end < 0 or self._transport is None or self._transport.is_closing():
                 self._wait_for_more()
+                return
+            if end > protocol.MAX_REQUEST_BYTES:
+                self._refuse_long_line()
                 return
             line = bytes(self._received[:end])
             message = protocol.parse_message(line)
@@ -169,8 +177,16 @@ class Connection(asyncio.Protocol):
             return
         self._transport.resume_reading()
         if len(self._received) > protocol.MAX_REQUEST_BYTES:
-            self._malformed_line(None, f"a line is longer than {protocol.MAX_REQUEST_BYTES} bytes")
-            self.end()
+            self._refuse_long_line()
+
+    def _refuse_long_line(self) -> None:
+        """Answer, and hang up a little later."""
+        self._deaf = True
+        self._received.clear()
+        self._malformed_line(None, f"a line is longer than {protocol.MAX_REQUEST_BYTES} bytes")
+        if self._transport is not None:
+            self._transport.resume_reading()
+        asyncio.get_running_loop().call_later(FAREWELL_S, self.end)
 
     def _send(self, line: bytes) -> None:
         if self._transport is None or self._transport.is_closing():
@@ -236,7 +252,7 @@ class Connection(asyncio.Protocol):
         if refusal is not None:
             raise refusal
         if self.crowded and not method.urgent and name != "hello":
-            raise Refused("too many clients: this one may only stop", remedy="close other clients, and connect again")
+            raise self._server.crowd_refusal()
         if len(self._pending) >= MAX_PENDING * (1 + method.urgent):
             raise Refused("too many requests under way", limit=MAX_PENDING, remedy="wait for answers")
         return method

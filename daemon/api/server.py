@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from canhelm import protocol
+from canhelm.errors import Refused
 from daemon.api.connection import Connection
 from daemon.api.listeners import open_listener, remove_socket
 from daemon.api.peers import Rights
@@ -25,7 +26,7 @@ MAX_CLIENTS = 32
 RESERVED_CLIENTS = 8
 """Further clients that may only stop: a crowd must not keep anybody from stopping the robot."""
 IDLE_S = 2.0
-"""Silence after which a client may lose its place to another one (longer than a lease lives without renewal)."""
+"""The least silence after which a client may lose its place to another one."""
 
 
 class Backend(Protocol):
@@ -186,7 +187,7 @@ class Server:
             connection.abort()
             return
         ordinary = {each for each in self.connections if not each.crowded}
-        if len(ordinary) >= MAX_CLIENTS and not self._dismiss_idle(ordinary, max(IDLE_S, self.backend.lease_timeout_s)):
+        if len(ordinary) >= MAX_CLIENTS and not self._dismiss_idle(ordinary, self._idle_enough_s):
             connection.crowded = True
             others = self.connections - ordinary
             if len(others) >= RESERVED_CLIENTS and not self._dismiss_idle(others, 0.0):
@@ -194,6 +195,18 @@ class Server:
                 return
         self.connections.add(connection)
         self.counters.clients = len(self.connections)
+
+    def crowd_refusal(self) -> Refused:
+        """What a client is told for whom there was no place."""
+        longest_s = max((each.idle_s for each in self.connections if not each.crowded), default=0.0)
+        wait_s = max(0.0, self._idle_enough_s - longest_s)
+        told = f"a place gets free in {wait_s:.1f} s at the earliest, from a client that says nothing for that long"
+        return Refused("too many clients: this one may only stop", remedy=f"close other clients, or try again: {told}")
+
+    @property
+    def _idle_enough_s(self) -> float:
+        """Silence after which a client loses its place to another one; longer than a lease lives without renewal."""
+        return max(IDLE_S, self.backend.lease_timeout_s)
 
     def leave(self, connection: Connection) -> None:
         """A connection has ended."""

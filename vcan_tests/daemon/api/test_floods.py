@@ -10,11 +10,13 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from canhelm import protocol
-from daemon.api.connection import LINES_A_TURN, Connection
+from canhelm.protocol import MAX_REQUEST_BYTES
+from daemon.api.connection import FAREWELL_S, LINES_A_TURN, Connection
 from daemon.api.metering import BYTES_PER_S, REFUSED_PER_S, REQUESTS_PER_S, Allowance
 from vcan_tests.docs.virtual_daemon import OpenServer, Wire
 from vcan_tests.robot import Robot, running_robot
@@ -196,3 +198,32 @@ async def test_who_flooded_may_ask_again_after_a_second() -> None:
         await asyncio.sleep(1.0)
         flooder.say(b"".join(requests("hello", REQUESTS_PER_S)))
         assert results((await flooder.until_answered(FLOOD + REQUESTS_PER_S))[FLOOD:]) == REQUESTS_PER_S
+
+
+@pytest.mark.parametrize("end", [b"\n", b""])
+@pytest.mark.parametrize("length", [MAX_REQUEST_BYTES + 1, 100_000, 300_000])
+async def test_a_line_that_is_too_long_is_answered_with_the_limit_and_then_hung_up_on(length: int, end: bytes) -> None:
+    async with flooded(b" " * length + end) as (_, server, client, _):
+        answer = (await client.until_answered(1))[0]
+        assert answer["error"]["message"] == f"a line is longer than {MAX_REQUEST_BYTES} bytes"
+        client.say(protocol.make_request(1, "hello", {}))
+        await asyncio.sleep(2 * FAREWELL_S)
+        assert (len(client.answers), client.is_closing()) == (1, True)
+        assert server.counters.malformed == 1
+
+
+async def test_the_longest_line_is_carried_out() -> None:
+    async with flooded(protocol.make_request(1, "hello", {}).rstrip().ljust(MAX_REQUEST_BYTES) + b"\n") as robot:
+        assert "result" in (await robot[2].until_answered(1))[0]
+
+
+async def test_a_client_without_a_place_is_told_when_one_gets_free() -> None:
+    async with flooded() as (_, _, idle, late):
+        await asyncio.sleep(0.5)
+        late.connection.crowded = True
+        late.say(protocol.make_request(1, "status", {}))
+        await idle.ask("subscribe", rate_hz=0.1)
+        late.say(protocol.make_request(2, "status", {}))
+        first, second = (answer["error"]["data"]["remedy"] for answer in await late.until_answered(2))
+        assert "a place gets free in 1.5 s" in first
+        assert "a place gets free in 2.0 s" in second
