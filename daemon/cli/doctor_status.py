@@ -135,7 +135,7 @@ def _recording_findings(recording: Mapping[str, Any]) -> Iterator[Finding]:
 
 def _runs_findings(runs: Mapping[str, Any]) -> Iterator[Finding]:
     if runs.get("message"):
-        yield Finding("runs", "problem", str(runs["message"]), "make room there, or: canhelm runs delete NUMBER")
+        yield Finding("runs", "problem", str(runs["message"]), str(runs.get("remedy", "")))
 
 
 def _cycle_finding(cycle: Mapping[str, Any], earlier: Mapping[str, Any], pid: int | None) -> Finding:

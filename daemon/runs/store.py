@@ -135,10 +135,16 @@ class RunStore:
             shutil.rmtree(folder)
             taken -= size
         if self._free_bytes() < RESERVE_BYTES:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self.folder))
+            raise no_room(self.folder)
 
     def _free_bytes(self) -> int:
         return shutil.disk_usage(self.folder).free
+
+
+def no_room(folder: Path) -> OSError:
+    """Why a folder takes nothing more: its file system is read-only (a small one is full as well), or full."""
+    number = errno.EROFS if os.statvfs(folder).f_flag & os.ST_RDONLY else errno.ENOSPC
+    return OSError(number, os.strerror(number), str(folder))
 
 
 def _sync(folder: Path) -> None:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 import math
 import os
 import shutil
 from io import FileIO
 from pathlib import Path
 
-from daemon.runs.store import RESERVE_BYTES
+from daemon.runs.store import RESERVE_BYTES, no_room
 
 PARTS = 8
 """A file takes this part of all room; then the next one begins."""
@@ -125,7 +124,7 @@ class LogFiles:
                 path.unlink()
                 taken -= size
         if self._free_bytes() < RESERVE_BYTES:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self.path))
+            raise no_room(self._folder or self.path.parent)
 
     def _free_bytes(self) -> int:
         return shutil.disk_usage(self._folder or self.path.parent).free

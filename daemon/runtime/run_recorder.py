@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import logging
 import platform
 import time
@@ -42,6 +43,8 @@ from profiles.schema import Profile
 
 LOGGER = logging.getLogger("canhelm.runs")
 FLUSH_PERIOD_S = 1.0
+ROOM = "make room there, or: canhelm runs delete NUMBER"
+ELSEWHERE = "keep them in a folder that can be written: canhelm run --runs DIR"
 
 
 class Recording:
@@ -90,10 +93,11 @@ class RunRecorder:
 
     Attributes:
         message: what the disk said of the newest run; empty while it works.
+        remedy: what mends that.
     """
 
     def __init__(self, store: RunStore, supervisor: Supervisor, bus: Bus, profile: Profile, spec: str) -> None:
-        self.message = ""
+        self.message = self.remedy = ""
         self._store = store
         self._supervisor = supervisor
         self._bus = bus
@@ -130,7 +134,7 @@ class RunRecorder:
     def status(self) -> dict[str, Any]:
         """The runs for ``status``."""
         last = self._last.name if self._last else None
-        return {"folder": str(self._store.folder), "last": last, "message": self.message}
+        return {"folder": str(self._store.folder), "last": last, "message": self.message, "remedy": self.remedy}
 
     # --- guarded: a defect of the recording is no reason to stop a robot ----------------------------------------
 
@@ -158,12 +162,13 @@ class RunRecorder:
         self._given_up = True
         self._recordings.clear()
         self.message = "the recording of runs failed inside the daemon: report it with the log"
+        self.remedy = "canhelm doctor --bundle FILE packs what a report needs"
 
     # --- a run -------------------------------------------------------------------------------------------------
 
     def _begin(self, motion: Motion, part: int = 1) -> None:
         self._end_closed()
-        self.message, self._given_up = "", False
+        self.message, self.remedy, self._given_up = "", "", False
         recording = Recording(motion, part, self._loop.time())
         recording.facts = self._facts(recording)
         recording.cycles += self._rows.head
@@ -319,13 +324,12 @@ class RunRecorder:
 
     def _on_failure(self, error: OSError) -> None:
         told = f"runs cannot be written to {self._store.folder}: {error.strerror or error}"
+        remedy = ROOM if error.errno in (errno.ENOSPC, errno.EDQUOT) else ELSEWHERE
         for recording in self._recordings:
             recording.failed = True
         if not self.message:
-            self._supervisor.log.add(
-                "warning", "runs", told, "make room there, or `canhelm runs delete`; motions go on"
-            )
-        self.message = told
+            self._supervisor.log.add("warning", "runs", told, f"{remedy}; motions go on")
+        self.message, self.remedy = told, remedy
 
 
 def _ending(motion: Motion) -> dict[str, Any]:

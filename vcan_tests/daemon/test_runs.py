@@ -6,6 +6,7 @@ import asyncio
 import csv
 import errno
 import json
+import os
 from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import pytest
 import yaml
 
 from canhelm.errors import CanhelmError, UsageError
+from daemon.cli.doctor_status import status_findings
 from daemon.runs import store as store_module
 from daemon.runs.store import CYCLES, DRIVES, FRAMES, PROFILE, TERMS, Run, RunStore, choose, own_folder, read_runs
 from daemon.runtime.cycle_rows import CycleRows
@@ -129,11 +131,11 @@ async def test_a_long_motion_goes_on_in_further_runs(tmp_path: Path) -> None:
     assert (run.facts["ended"], run.facts["part"]) == ("done", run.number)
 
 
-async def refuse_to_write(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """A motion while the disk is full; its result."""
+async def refuse_to_write(robot: Robot, monkeypatch: pytest.MonkeyPatch, number: int = errno.ENOSPC) -> dict[str, Any]:
+    """A motion while the disk is full, or fails otherwise; its result."""
 
     def full(store: RunStore) -> Path:
-        raise OSError(errno.ENOSPC, "No space left on device")
+        raise OSError(number, os.strerror(number))
 
     with monkeypatch.context() as patched:
         patched.setattr(RunStore, "begin", full)
@@ -155,6 +157,20 @@ async def test_a_full_disk_is_told_once_with_what_mends_it(tmp_path: Path, monke
     assert "canhelm runs delete" in told[0]["remedy"]
 
 
+@pytest.mark.parametrize("number", [errno.EROFS, errno.EACCES])
+async def test_a_folder_that_cannot_be_written_is_told_with_the_option_for_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    async with running_robot(runs=RunStore(tmp_path)) as robot:
+        await refuse_to_write(robot, monkeypatch, number)
+        status = robot.app.service.status()
+    (event,) = (event for event in status["events"] if event["source"] == "runs")
+    found = next(found for found in status_findings(status, status) if found.check == "runs")
+    for told in (event["remedy"], found.mend):
+        assert "canhelm run --runs DIR" in told
+        assert "room" not in told
+
+
 async def test_a_defect_of_the_recording_does_not_stop_the_robot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -173,7 +189,8 @@ async def test_recording_goes_on_with_the_next_motion(tmp_path: Path, monkeypatc
     async with running_robot(runs=RunStore(tmp_path)) as robot:
         await refuse_to_write(robot, monkeypatch)
         await robot.call("drive.parallel", **STRAIGHT)
-        assert robot.app.service.status()["runs"] == {"folder": str(tmp_path), "last": "0001", "message": ""}
+        status = robot.app.service.status()["runs"]
+    assert (status["last"], status["message"], status["remedy"]) == ("0001", "", "")
 
 
 def test_a_disk_without_its_reserve_takes_no_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -182,6 +199,13 @@ def test_a_disk_without_its_reserve_takes_no_run(tmp_path: Path, monkeypatch: py
     with pytest.raises(OSError, match="No space"):
         RunStore(tmp_path).begin()
     assert RunStore(tmp_path).folders() == []
+
+
+def test_a_small_disk_that_is_read_only_is_not_called_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    closed = os.statvfs_result((4096, 4096, 100, 0, 0, 0, 0, 0, os.ST_RDONLY, 255))
+    monkeypatch.setattr(os, "statvfs", lambda path: closed)
+    with pytest.raises(OSError, match="Read-only file system"):
+        RunStore(tmp_path).begin()
 
 
 async def test_a_move_that_a_brick_carries_out_itself_leaves_its_progress(tmp_path: Path) -> None:
