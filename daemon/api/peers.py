@@ -12,12 +12,12 @@ import pwd
 import socket
 import struct
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from canhelm.errors import PermissionRefused
+from canhelm.errors import PermissionRefused, UsageError
 from canhelm.protocol import DRIVERS
 from daemon.api.parameters import Role
 
@@ -37,6 +37,17 @@ class Groups:
     watch: str = "canhelm-watch"
     drive: str = DRIVERS
     configure: str = "canhelm-admin"
+
+    def require(self) -> None:
+        """Raise UsageError where one that somebody has named is not there; the usual ones may be missing."""
+        for field in fields(self):
+            name = getattr(self, field.name)
+            if name != field.default and _number(name) is None:
+                raise UsageError(
+                    f"--{field.name}-group: there is no group {name!r}",
+                    value=name,
+                    remedy=f"sudo groupadd --system {name}, or correct the name",
+                )
 
 
 @dataclass(frozen=True, slots=True)

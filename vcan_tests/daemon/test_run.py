@@ -126,14 +126,30 @@ def test_the_folder_of_a_socket_is_not_made_up(option: str, tmp_path: Path, caps
     [
         (["--tcp", "4310"], "--tcp and --tokens need each other"),
         (["--tokens", "tokens"], "--tcp and --tokens need each other"),
-        (["--tcp", "robot:http", "--tokens", "tokens"], "is no address"),
+        (["--tcp", "robot:http", "--tokens", "tokens"], "give PORT or HOST:PORT, with a port of 1 to 65535"),
+        (["--tcp", "abc", "--tokens", "tokens"], "give PORT or HOST:PORT, with a port of 1 to 65535"),
+        (["--tcp", "99999", "--tokens", "tokens"], "--tcp 99999: there is no such port"),
     ],
 )
-def test_half_of_a_network_access_is_wrong_usage(
+def test_a_network_access_that_leads_nowhere_is_wrong_usage(
     arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main([*SIMULATED, *arguments]) == 2
     assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("role", ["watch", "drive", "configure"])
+def test_a_group_that_is_named_has_to_be_there(role: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*SIMULATED, f"--{role}-group", "no-such-group"]) == 2
+    assert f"--{role}-group: there is no group 'no-such-group' - sudo groupadd" in capsys.readouterr().err
+
+
+def test_a_group_of_the_environment_has_to_be_there_too(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("CANHELM_DRIVE_GROUP", "no-such-group")
+    assert main(SIMULATED) == 2
+    assert "there is no group 'no-such-group'" in capsys.readouterr().err
 
 
 def test_tokens_that_others_may_read_keep_a_daemon_from_beginning(tmp_path: Path) -> None:

@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from canhelm.errors import UsageError
+from daemon.api import peers
 from daemon.api.listeners import make_acl, open_listener
 from daemon.api.methods import METHODS
 from daemon.api.parameters import Role
@@ -67,6 +69,14 @@ def test_root_and_the_daemons_own_user_may_do_everything(rights: Rights, uid: in
 def test_a_group_that_the_system_does_not_have_gives_nobody_anything() -> None:
     rights = Rights(Groups("no-such-lookers", "no-such-drivers", "no-such-admins"))
     assert rights.numbers == []
+
+
+def test_the_usual_groups_may_be_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(peers, "_number", {grp.getgrgid(os.getgid()).gr_name: os.getgid()}.get)
+    Groups().require()
+    Groups(drive=grp.getgrgid(os.getgid()).gr_name).require()
+    with pytest.raises(UsageError, match="no-such-admins"):
+        Groups(configure="no-such-admins").require()
 
 
 def test_the_kernel_tells_user_and_groups_of_a_peer() -> None:
