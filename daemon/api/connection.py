@@ -346,7 +346,8 @@ class Connection(asyncio.Protocol):
         return self._seen()
 
     def _seen(self) -> dict[str, Any]:
-        return {**self._server.status(), "role": self._peer.role}
+        more = self._server.rights.way_up(self._peer)
+        return {**self._server.status(), "role": self._peer.role, **({"role_remedy": more} if more else {})}
 
     async def _subscribe(self, params: dict[str, Any]) -> dict[str, Any]:
         self._stop_sampling()

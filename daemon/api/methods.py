@@ -41,7 +41,7 @@ _TALK = (
         "State at a glance.",
         (),
         "state, message, nodes, brakes, vehicle, holder (who has the robot), role (the caller's), localisation, bus, "
-        "cycle, recording, events",
+        "cycle, recording, events, role_remedy (how the caller gets the next role)",
         Role.WATCH,
     ),
     Method(

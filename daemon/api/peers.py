@@ -138,19 +138,26 @@ class Rights:
         """
         if _RANK[peer.role] >= _RANK[role]:
             return None
+        remedy = self._remedy(role, peer)
         if peer.name:
-            told = f"{what} needs the role {role}; {peer.name} has not got it"
-            return PermissionRefused(told, remedy=f"log in with a token for {role}")
+            return PermissionRefused(f"{what} needs the role {role}; {peer.name} has not got it", remedy=remedy)
         giving = " or ".join(name for other, name in self._names.items() if _RANK[other] >= _RANK[role])
         has = ", ".join(sorted(map(_group, peer.groups)))
         return PermissionRefused(
             f"{what} needs the role {role}, which the group {giving} gives; {peer.user} is in {has}",
-            remedy=self._remedy(role, peer.user),
+            remedy=remedy,
         )
 
-    def _remedy(self, role: Role, user: str) -> str:
+    def way_up(self, peer: Peer) -> str | None:
+        """How a peer gets the next role; None for one that may do everything."""
+        higher = [role for role in Role if _RANK[role] > _RANK[peer.role]]
+        return self._remedy(higher[0], peer) if higher else None
+
+    def _remedy(self, role: Role, peer: Peer) -> str:
+        if peer.name:
+            return f"log in with a token for {role}"
         group = self._names[role]
-        join = f"sudo usermod -aG {group} {user}, then log in again"
+        join = f"sudo usermod -aG {group} {peer.user}, then log in again"
         return join if role in self._numbers else f"sudo groupadd --system {group}, start the daemon anew; {join}"
 
 

@@ -17,8 +17,8 @@ WATCHED_S = 1.0
 """How long the daemon's counters are watched: what is not counted meanwhile is over."""
 STARTING = ("waiting", "booting")
 """States of a vehicle whose nodes are being configured, which a serial line has to carry beside its cycle."""
-LESSER_ROLES = {"watch": ("only watch and stop", "canhelm"), "drive": ("watch, drive and stop", "canhelm-admin")}
-"""What those who may not do everything may do, and the group that gives the next role where no other was named."""
+LESSER_ROLES = {"watch": "only watch and stop", "drive": "watch, drive and stop"}
+"""What those who may not do everything may do."""
 SLOW_LINE = 0.8
 """Share of its planned rate below which a serial line is slow."""
 FASTER_LINE = "free this machine; a USB adapter needs its latency timer at 1 ms (setserial DEVICE low_latency)"
@@ -69,9 +69,8 @@ def _role_findings(status: Mapping[str, Any]) -> Iterator[Finding]:
     if role == "configure":
         yield Finding("role", "ok", "you may watch, drive and configure this robot")
     elif role in LESSER_ROLES:
-        may, group = LESSER_ROLES[role]
-        mend = f"for more: sudo usermod -aG {group} $USER, then log in again (docs/rights.md)"
-        yield Finding("role", "note", f"you may {may} this robot", mend)
+        mend = f"for more: {status.get('role_remedy')} (docs/rights.md)"
+        yield Finding("role", "note", f"you may {LESSER_ROLES[role]} this robot", mend)
 
 
 def _wire_findings(bus: Mapping[str, Any], earlier: Mapping[str, Any], *, anyone: bool) -> Iterator[Finding]:

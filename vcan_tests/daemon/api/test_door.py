@@ -60,7 +60,8 @@ def address(door: Door) -> str:
 async def test_who_shows_a_token_has_its_role_and_no_other(door: Door, visit: Visit) -> None:
     visitor = await visit(door)
     assert (await visitor.ask("login", token=WATCHES))["result"] == {"role": "watch"}
-    assert (await visitor.ask("status"))["result"]["role"] == "watch"
+    status = (await visitor.ask("status"))["result"]
+    assert (status["role"], status["role_remedy"]) == ("watch", "log in with a token for drive")
     error = (await visitor.ask("steer", pair="front", angle_deg=1.0))["error"]
     assert error["message"] == f"steer needs the role drive; a token for watch at {LOOPBACK} has not got it"
 

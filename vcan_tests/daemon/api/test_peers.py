@@ -116,6 +116,23 @@ def test_a_refusal_tells_how_to_make_a_group_that_is_missing(monkeypatch: pytest
     assert str(refusal.remedy).startswith("sudo groupadd --system no-such-drivers, start the daemon anew; sudo usermod")
 
 
+@pytest.mark.parametrize(("group", "next_one"), [("lookers", "drivers"), ("drivers", "admins")])
+def test_the_way_to_the_next_role_is_its_group(
+    rights: Rights, group: str, next_one: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Peer, "user", "alice")
+    assert rights.way_up(peer_in(rights, group)) == f"sudo usermod -aG {next_one} alice, then log in again"
+
+
+def test_for_who_has_shown_a_token_the_way_to_the_next_role_is_another_one(rights: Rights) -> None:
+    peer = replace(peer_in(rights), role=Role.DRIVE, name="a token for drive at 127.0.0.1")
+    assert rights.way_up(peer) == "log in with a token for configure"
+
+
+def test_there_is_no_way_up_for_who_may_do_everything(rights: Rights) -> None:
+    assert rights.way_up(peer_in(rights, "admins")) is None
+
+
 @pytest.mark.parametrize("method", ["hello", "stop", "estop"])
 def test_whoever_may_open_the_socket_may_stop_the_robot(method: str) -> None:
     assert METHODS[method].role is Role.STOP
