@@ -34,7 +34,7 @@ from profiles.schema import Profile
 if TYPE_CHECKING:
     from daemon.api.door import Door
     from daemon.api.gateway309 import Gateway309
-    from daemon.api.peers import Groups, Rights
+    from daemon.api.peers import Rights
     from daemon.api.server import Server
 
 LOGGER = logging.getLogger("canhelm")
@@ -90,7 +90,7 @@ class App:
         inherited: sockets that listen already, by their paths; the service manager has opened them and takes them away.
         faults: that strike the simulated network; counted from its start.
         tcp: where the API is served over TCP, too; None for nowhere.
-        groups: those whose members may watch, drive and configure; None: the usual ones.
+        groups: names of those whose members may watch, drive and configure; None: the usual ones.
     """
 
     def __init__(
@@ -109,7 +109,7 @@ class App:
         profile_file: Path | None = None,
         runs: RunStore | None = None,
         faults: Sequence[PlacedFault] = (),
-        groups: Groups | None = None,
+        groups: tuple[str, str, str] | None = None,
         tcp: TcpAccess | None = None,
     ) -> None:
         self.spec = bus
@@ -165,9 +165,11 @@ class App:
             self.network.scanner.on_scan = localiser.take
 
     def _rights(self) -> Rights:
-        from daemon.api.peers import Rights
+        from daemon.api.peers import Groups, Rights
 
-        return Rights(self._groups)
+        groups = Groups(*self._groups or ())
+        groups.require()
+        return Rights(groups)
 
     def _serve(self, socket: Path) -> Server:
         from daemon.api.server import Server

@@ -88,7 +88,6 @@ def run(
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _end_before_it_began)
-    from daemon.api.peers import Groups
     from daemon.app import App, GatewayAccess
     from daemon.runtime.activation import inherited_sockets
     from daemon.runtime.clock import run_patient
@@ -106,8 +105,6 @@ def run(
     if profile and bit_rate is not None:
         raise UsageError("--bit-rate is for a bus without a profile", remedy="write network.bit_rate in the profile")
     served_over_tcp = tcp_access(tcp, tokens)
-    groups = Groups(watch_group, drive_group, configure_group)
-    groups.require()
     for given in (socket, gateway):
         _require_folder(given)
     journal.log_to_stderr(os.environ)
@@ -128,7 +125,7 @@ def run(
         runs=_store(runs, runs_mb, robot.name),
         profile_file=loaded.path.resolve() if loaded else None,
         faults=struck_by,
-        groups=groups,
+        groups=(watch_group, drive_group, configure_group),
         tcp=served_over_tcp,
     )
     runner: Callable[[Coroutine[Any, Any, str]], str] = run_patient if simulates(chosen) else asyncio.run

@@ -9,11 +9,13 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import astuple, replace
 from pathlib import Path
 
 import pytest
 
-from canhelm.errors import ConfigError
+from canhelm.errors import ConfigError, UsageError
+from daemon.api.peers import Groups
 from daemon.app import App, GatewayAccess, TcpAccess
 from daemon.cli.main import main
 from daemon.cli.run import tcp_access
@@ -139,17 +141,11 @@ def test_a_network_access_that_leads_nowhere_is_wrong_usage(
 
 
 @pytest.mark.parametrize("role", ["watch", "drive", "configure"])
-def test_a_group_that_is_named_has_to_be_there(role: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([*SIMULATED, f"--{role}-group", "no-such-group"]) == 2
-    assert f"--{role}-group: there is no group 'no-such-group' - sudo groupadd" in capsys.readouterr().err
-
-
-def test_a_group_of_the_environment_has_to_be_there_too(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("CANHELM_DRIVE_GROUP", "no-such-group")
-    assert main(SIMULATED) == 2
-    assert "there is no group 'no-such-group'" in capsys.readouterr().err
+def test_a_group_that_is_named_has_to_be_there(role: str, tmp_path: Path) -> None:
+    named = replace(Groups(), **{role: "no-such-group"})
+    with pytest.raises(UsageError, match=f"--{role}-group: there is no group 'no-such-group'") as caught:
+        App(load("max2d").profile, socket=tmp_path / "x.sock", groups=astuple(named))
+    assert "sudo groupadd --system no-such-group" in str(caught.value.remedy)
 
 
 def test_tokens_that_others_may_read_keep_a_daemon_from_beginning(tmp_path: Path) -> None:
