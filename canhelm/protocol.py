@@ -238,8 +238,8 @@ def open_socket(path: str | os.PathLike[str], timeout_s: float = 5.0) -> socket.
 
     Raises:
         DaemonNotRunning: nobody listens there.
-        PermissionRefused: somebody may, but this user may not open it, or the token for ``tcp:HOST:PORT`` is wrong.
-        ConfigError: there is no token.
+        PermissionRefused: somebody may, but this user may not open it, or its token for ``tcp:HOST:PORT`` is missing
+            or wrong.
     """
     if os.fspath(path).startswith(tcp.PREFIX):
         return _open_over_tcp(os.fspath(path), timeout_s)

@@ -6,7 +6,7 @@ import os
 import socket
 from pathlib import Path
 
-from canhelm.errors import ConfigError, DaemonNotRunning, UsageError
+from canhelm.errors import DaemonNotRunning, PermissionRefused, UsageError
 
 PREFIX = "tcp:"
 _MAX_ANSWER_BYTES = 65_536
@@ -37,17 +37,28 @@ def connected(address: str, timeout_s: float) -> socket.socket:
 
 
 def own_token() -> str:
-    """The token in CANHELM_TOKEN, or in the file that CANHELM_TOKEN_FILE names. Raises ConfigError without any."""
+    """The token in CANHELM_TOKEN, or in the file that CANHELM_TOKEN_FILE names.
+
+    Returns:
+        Of a file the last word of its first line with any, so that a line of the daemon's file will do.
+
+    Raises:
+        PermissionRefused: there is none.
+    """
     token, file = os.environ.get("CANHELM_TOKEN"), os.environ.get("CANHELM_TOKEN_FILE")
     if token:
         return token
     remedy = "put it into CANHELM_TOKEN, or name its file in CANHELM_TOKEN_FILE"
     if not file:
-        raise ConfigError("a daemon that is reached over TCP wants a token", remedy=remedy)
+        raise PermissionRefused("a daemon that is reached over TCP wants a token", remedy=remedy)
     try:
-        return Path(file).read_text(encoding="utf-8").strip()
+        lines = Path(file).read_text(encoding="utf-8").strip().splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"the token in {file} cannot be read: {error}", remedy=remedy) from None
+        reason = error.strerror if isinstance(error, OSError) else "it is no text"
+        raise PermissionRefused(f"the token in {file} cannot be read: {reason}", remedy=remedy) from None
+    if not lines:
+        raise PermissionRefused(f"{file} has no token", remedy="write it, or a line of the daemon's file, into it")
+    return lines[0].split()[-1]
 
 
 def first_line(connection: socket.socket) -> bytes:

@@ -14,6 +14,7 @@ import pytest_asyncio
 from canhelm import aio, protocol
 from canhelm.client import Client
 from canhelm.errors import ConfigError, DaemonNotRunning, PermissionRefused, UsageError
+from canhelm.tcp import own_token
 from daemon.api import door as door_module
 from daemon.api.door import LOOPBACK, MAX_LINE_BYTES, MAX_WAITING, Door
 from daemon.api.parameters import Role
@@ -156,9 +157,36 @@ def test_an_address_that_is_none_is_refused(wrong: str, monkeypatch: pytest.Monk
 def test_without_any_token_a_client_is_told_where_to_put_one(monkeypatch: pytest.MonkeyPatch) -> None:
     for variable in ("CANHELM_TOKEN", "CANHELM_TOKEN_FILE"):
         monkeypatch.delenv(variable, raising=False)
-    with pytest.raises(ConfigError, match="wants a token") as caught:
+    with pytest.raises(PermissionRefused, match="wants a token") as caught:
         protocol.open_socket("tcp:127.0.0.1:1")
     assert "CANHELM_TOKEN_FILE" in str(caught.value.remedy)
+
+
+@pytest.fixture
+def token_file(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """A file that CANHELM_TOKEN_FILE names, and that is not there yet."""
+    monkeypatch.delenv("CANHELM_TOKEN", raising=False)
+    monkeypatch.setenv("CANHELM_TOKEN_FILE", str(tmp_path / "token"))
+    return tmp_path / "token"
+
+
+@pytest.mark.parametrize("text", [DRIVES, f"drive {DRIVES}\n", f"\n drive\t{DRIVES}\nwatch {WATCHES}\n"])
+def test_a_clients_file_has_a_token_or_lines_of_the_daemons_file(text: str, token_file: Path) -> None:
+    token_file.write_text(text)
+    assert own_token() == DRIVES
+
+
+def test_a_file_without_a_token_is_named(token_file: Path) -> None:
+    token_file.write_text("\n")
+    with pytest.raises(PermissionRefused, match=f"{token_file} has no token"):
+        own_token()
+
+
+def test_a_file_of_a_token_that_is_missing_is_one_sentence(token_file: Path) -> None:
+    with pytest.raises(PermissionRefused) as caught:
+        own_token()
+    assert caught.value.message == f"the token in {token_file} cannot be read: No such file or directory"
+    assert "name its file in CANHELM_TOKEN_FILE" in str(caught.value.remedy)
 
 
 @pytest.mark.parametrize("answer", [b"", b"HTTP/1.0 400 Bad Request\r\n\r\n"])
