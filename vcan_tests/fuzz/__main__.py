@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
+from vcan_tests.arguments import not_negative
 from vcan_tests.fuzz.hunt import hunt, keep
 from vcan_tests.fuzz.rooms import targets
 from vcan_tests.fuzz.target import Target
@@ -26,7 +27,7 @@ def main(argv: Sequence[str] | None = None, folder: Path = FOUND) -> int:
         The exit code: 0 where nothing was found.
     """
     parser = argparse.ArgumentParser(prog="make fuzz", description=__doc__)
-    parser.add_argument("--minutes", type=float, default=10.0, help="of the processor, for each target")
+    parser.add_argument("--minutes", type=not_negative, default=10.0, help="of the processor, for each target")
     parser.add_argument("targets", nargs="*", metavar="target", help="all where none is named")
     asked = parser.parse_args(argv)
     if unknown := [name for name in asked.targets if name not in targets()]:

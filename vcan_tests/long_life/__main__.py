@@ -7,7 +7,7 @@ import json
 import logging
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -19,18 +19,19 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from profiles.loader import load
+from vcan_tests.arguments import positive
 from vcan_tests.long_life.figures import draw, growth_per_h, table
 from vcan_tests.long_life.life import Life, live
 
 
-def main() -> int:
+def main(argv: Sequence[str] | None = None) -> int:
     """0 after a good life, 1 after one with defects."""
     parser = argparse.ArgumentParser(prog="python -m vcan_tests.long_life", description=__doc__)
-    parser.add_argument("--hours", type=float, default=12.0, help="of virtual time (default 12)")
+    parser.add_argument("--hours", type=positive, default=12.0, help="of virtual time (default 12)")
     parser.add_argument("--seed", type=int, default=1, help="of everything random (default 1)")
     parser.add_argument("--out", type=Path, default=Path("long-life-out"), help="folder for figures and picture")
-    parser.add_argument("--cycle-hz", type=float, help="of the robot; the profile's where left out")
-    asked = parser.parse_args()
+    parser.add_argument("--cycle-hz", type=positive, help="of the robot; the profile's where left out")
+    asked = parser.parse_args(argv)
     asked.out.mkdir(parents=True, exist_ok=True)
     profile = load("max2d").profile
     if asked.cycle_hz is not None:
