@@ -15,6 +15,8 @@ from daemon.runtime.streams import valid_for_s
 from drivers.contract import Brake, BrakeState, Drive, SteeringEncoder
 from profiles.schema import Profile
 
+BRICK_DELAY_S: Final = 0.5
+"""What a stop takes to reach a brick's motor, and its rest to come back, a few turnarounds of Bluetooth; assumed."""
 _ROUNDING: Final = 1e-9
 
 
@@ -162,10 +164,11 @@ class Vehicle(ABC):
         return drive.continuous_current_a if drive else math.inf
 
     def stopping_time_s(self) -> float:
-        """Time that the slowest quick-stop ramp needs from the present speeds."""
+        """Time that the slowest quick-stop ramp needs from the present speeds, until its end is known."""
         ramps = {name: drive.quick_stop_m_s2 for name, drive in self.profile.wheels.items()}
+        delays = {name: 0.0 if name in self.profile.drives else BRICK_DELAY_S for name in ramps}
         drives = (*self.drives, *self.aside)
-        return max((abs(drive.speed_m_s) / ramps[drive.name] for drive in drives), default=0.0)
+        return max((abs(drive.speed_m_s) / ramps[drive.name] + delays[drive.name] for drive in drives), default=0.0)
 
     def status(self) -> dict[str, Any]:
         """The vehicle for ``status``."""
