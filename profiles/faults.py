@@ -9,16 +9,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal, get_args, get_type_hints
 
 import msgspec
 from msgspec import Meta
 
 from canhelm.errors import UsageError
-from profiles.parts import NotNegative, Part, Positive
+from profiles.parts import ADDRESS_PATTERN, NotNegative, Part, Positive
 from profiles.provenance import Mapping, Mistake, Node, Reader, listed, place_of
 from profiles.schema import Profile
-from profiles.shape import Shape
+from profiles.shape import Shape, expected
 
 KindName = Literal[
     "lose",
@@ -53,7 +53,7 @@ KindName = Literal[
 KIND_NAMES: tuple[str, ...] = get_args(KindName)
 Count = Annotated[int, Meta(ge=1, le=1_000_000_000)]
 Share = Annotated[float, Meta(gt=0, le=1)]
-ObjectAddress = Annotated[str, Meta(pattern=r"^0x[0-9A-Fa-f]{1,4}(/([0-9]{1,2}|1[0-9]{2}|2[0-4][0-9]|25[0-5]))?$")]
+ObjectAddress = Annotated[str, Meta(pattern=ADDRESS_PATTERN)]
 
 NODES = ("drives", "encoders")
 _WHEN = ("kind", "at_s", "at_frame")
@@ -162,6 +162,7 @@ class FaultFile(Part, frozen=True, kw_only=True):
 
 _WANTED = "write faults: with a list of them"
 _FILE_TYPE = msgspec.inspect.type_info(FaultFile)
+_TYPES = {name: msgspec.inspect.type_info(kind) for name, kind in get_type_hints(Fault, include_extras=True).items()}
 _DEFAULTS = dict(zip(Fault.__struct_fields__[1:], Fault.__struct_defaults__, strict=True))
 
 
@@ -186,7 +187,8 @@ def objections(fault: Fault, profile: Profile) -> Iterator[Objection]:
     given = {field for field, default in _DEFAULTS.items() if getattr(fault, field) != default}
     for field in kind.needs:
         if field not in given:
-            yield Objection(field, f"is missing: {fault.kind} needs it", f"write {field}:")
+            remedy = f"write {field}: in a file, {_option(field)} in a command"
+            yield Objection(field, f"is missing: {fault.kind} needs it", remedy)
     for field in sorted(given - set(kind.fields)):
         has = ", ".join(kind.fields[1:])
         yield Objection(field, f"means nothing for {fault.kind}", f"leave it out; it takes {has}")
@@ -196,9 +198,21 @@ def objections(fault: Fault, profile: Profile) -> Iterator[Objection]:
         yield Objection("code", f"0x{fault.code:X} is no EMCY code", "give 0x0000 to 0xFFFF")
     if fault.part is not None and kind.parts:
         names = [name for section in kind.parts for name in getattr(profile, section)]
-        if fault.part not in names:
-            sections = " and ".join(kind.parts)
-            yield Objection("part", f"{fault.part!r} is none of the {sections}", f"one of {', '.join(names) or 'none'}")
+        sections = " and ".join(kind.parts)
+        if not names:
+            yield Objection("part", f"{fault.part!r} cannot be: this robot has no {sections}", "take another kind")
+        elif fault.part not in names:
+            yield Objection("part", f"{fault.part!r} is none of the {sections}", f"one of {', '.join(names)}")
+
+
+def _option(field: str) -> str:
+    """How ``canhelm sim fault`` takes a field."""
+    return "a second word" if field == "part" else f"--{field.removesuffix('_s').removesuffix('_deg')}"
+
+
+def wanted(field: str) -> str:
+    """What a field of a fault may be, in words."""
+    return expected(_TYPES[field]).removesuffix(" or nothing")
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,8 @@ Name = Annotated[str, Meta(pattern="^[A-Za-z][A-Za-z0-9_-]*$", max_length=40)]
 """Begins with a letter: commands take a node id or a name."""
 Positive = Annotated[float, Meta(gt=0)]
 NotNegative = Annotated[float, Meta(ge=0)]
+ADDRESS_PATTERN = r"^0x[0-9A-Fa-f]{1,4}(/([0-9]{1,2}|1[0-9]{2}|2[0-4][0-9]|25[0-5]))?$"
+"""An object of a node: its index, and where it has several its subindex."""
 
 
 class Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -10,6 +10,7 @@ from typing import Any
 from msgspec import inspect
 
 from profiles.own_vehicle import CLASS_PATTERN
+from profiles.parts import ADDRESS_PATTERN
 from profiles.provenance import FieldPath, Listing, Mapping, Mistake, Node, Place, Scalar, dotted, plain, short
 
 _NUMBERS = {inspect.IntType: "a whole number", inspect.FloatType: "a number"}
@@ -117,7 +118,7 @@ def expected(kind: inspect.Type) -> str:
     if isinstance(kind, inspect.IntType | inspect.FloatType):
         return _NUMBERS[type(kind)] + _range(kind)
     if isinstance(kind, inspect.StrType):
-        forms = {CLASS_PATTERN: "module:Class, as mecanum:Mecanum"}
+        forms = {CLASS_PATTERN: "module:Class, as mecanum:Mecanum", ADDRESS_PATTERN: "an object as 0x6041/0"}
         return forms.get(kind.pattern or "", "a text" + (f" that matches {kind.pattern}" if kind.pattern else ""))
     if isinstance(kind, inspect.TupleType):
         return f"a list of {len(kind.item_types)}"

@@ -64,7 +64,7 @@ SIMULATION_METHODS = (
             Param("at_frame", "integer", "with which frame it begins, the next one being 1", "", None, 1, 1e9),
             Param("for_s", "number", "how long it lasts; until it is cleared where left out", "s", None, 0.0),
             Param("nth", "integer", "only this one of the frames or requests that fit", "", None, 1, 1e9),
-            Param("probability", "number", "share that it strikes", "", None, 0.0, 1.0),
+            Param("probability", "number", "share that it strikes, greater than 0 and to 1", default=None),
             Param("times", "integer", "how many it strikes at most", "", None, 1, 1e9),
             Param("delay_s", "number", "by how much frames come late", "s", None, 0.0),
             Param("code", "integer", "EMCY code, or SDO abort code", "", None, 0, 0xFFFF_FFFF),

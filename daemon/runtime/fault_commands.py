@@ -10,7 +10,8 @@ from canhelm.errors import Refused, UsageError
 from daemon.runtime.handlers import Handler, Params
 from daemon.runtime.supervisor import Supervisor
 from drivers.simulated.faults import Faults
-from profiles.faults import Fault, objections
+from profiles.faults import Fault, objections, wanted
+from profiles.provenance import short
 
 
 class FaultCommands:
@@ -43,9 +44,11 @@ class FaultCommands:
         try:
             fault = msgspec.convert(given, Fault)
         except msgspec.ValidationError as error:
-            what, _, place = str(error).partition(" - at `$.")
-            field = place.strip("`")
-            raise UsageError(f"{field}: {what}", object=field, remedy="docs/faults.md has what it may be") from None
+            field = str(error).partition(" - at `$.")[2].strip("`")
+            remedy = f"give {wanted(field)}"
+            raise UsageError(
+                f"{field} is {short(str(given[field]))}", object=field, value=given[field], remedy=remedy
+            ) from None
         for objection in objections(fault, self._supervisor.vehicle.profile):
             what = f"{fault.kind}: {objection.field} {objection.what}"
             raise UsageError(what, object=objection.field, remedy=objection.remedy)

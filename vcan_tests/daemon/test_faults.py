@@ -300,6 +300,7 @@ async def test_a_brick_out_of_range_is_told_and_comes_back() -> None:
         ({"kind": "silence", "part": "left"}, "none of the drives and encoders"),
         ({"kind": "delay"}, "delay_s is missing"),
         ({"kind": "lose", "for_s": 0.0}, "for_s"),
+        ({"kind": "brick_lost", "part": "nxt"}, "this robot has no bricks"),
         ({"kind": "wrong_identity", "part": 3, "object": "0x9999"}, "front_left has no object 0x9999"),
     ],
 )
@@ -309,6 +310,23 @@ async def test_a_fault_that_cannot_happen_is_refused_with_a_remedy(fault: dict[s
             await robot.call("simulation.fault", **fault)
         assert caught.value.remedy
         assert (await robot.call("simulation.faults"))["faults"] == []
+
+
+@pytest.mark.parametrize(
+    ("fault", "told"),
+    [
+        ({"kind": "encoder_jump", "part": "front"}, "write angle_deg: in a file, --angle in a command"),
+        ({"kind": "silence"}, "write part: in a file, a second word in a command"),
+        ({"kind": "sdo_abort", "part": "front", "object": "banana"}, "give an object as 0x6041/0"),
+        ({"kind": "lose", "probability": 0.0}, "give a number greater than 0 and to 1"),
+        ({"kind": "lose", "probability": 2.0}, "give a number greater than 0 and to 1"),
+    ],
+)
+async def test_a_mistaken_fault_is_told_how_it_is_written(fault: dict[str, Any], told: str) -> None:
+    async with running_robot() as robot:
+        with pytest.raises(UsageError) as caught:
+            await robot.call("simulation.fault", **fault)
+        assert told in str(caught.value.remedy)
 
 
 async def test_a_real_robot_has_no_faults_to_set() -> None:

@@ -99,7 +99,7 @@ def test_a_part_that_is_no_name_is_refused_with_its_line(
         ("faults:\n- kind: brake_stuck\n  part: front_left\n", "none of the brakes; one of"),
         ("faults:\n- kind: lose\n  at_s: 1\n  at_frame: 2\n", "/faults.yaml:4: faults[0].at_frame: and at_s"),
         ("faults:\n- {kind: emcy, part: front, code: 0x10000}\n", "faults[0].code: 0x10000 is no EMCY code"),
-        ("faults:\n- {kind: sdo_abort, part: front, object: statusword}\n", "faults[0].object: is 'statusword'"),
+        ("faults:\n- {kind: sdo_abort, part: front, object: statusword}\n", "write an object as 0x6041/0"),
         ("", "/faults.yaml:1: is empty; write faults: with a list of them"),
         ("faults: 3\n", "/faults.yaml:1: faults: is 3; write a list of"),
         ("- kind: lose\n", "/faults.yaml:1: is not a mapping"),
