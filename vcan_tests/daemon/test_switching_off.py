@@ -42,9 +42,7 @@ async def test_a_drive_that_hears_nothing_does_not_push_on_alone_when_the_others
         assert _powered(robot) == []
 
 
-async def test_a_turning_drive_that_is_configured_again_and_does_not_answer_stops_by_life_guarding() -> (
-    None
-):
+async def test_a_turning_drive_that_is_configured_again_and_does_not_answer_stops_by_life_guarding() -> None:
     async with running_robot(expect_errors=True) as robot:
         driving = robot.begin("drive.parallel", angle_deg=0.0, speed_m_s=0.3, duration_s=5.0)
         await robot.until(lambda: robot.speed_m_s > 0.28)
