@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import os
 import shutil
 import signal
@@ -215,18 +216,30 @@ class Robot:
         await until(lambda: self.speed_m_s() > 0.9 * speed_m_s)
 
     async def turn_front_pair(self) -> None:
-        """Begin to turn a pair of wheels by much; returns while it turns."""
-        self.call("steer", pair="front", angle_deg=80.0, wait=False)
-        await until(lambda: self.speed_m_s() > 0.02 and "released" in self.brakes())
+        """Begin to turn a pair of wheels by much, away from where it stands; returns while it turns."""
+        heading_deg = self.status()["vehicle"]["heading_deg"]["front"]
+        self.call("steer", pair="front", angle_deg=math.copysign(80.0, -heading_deg), wait=False)
+        await until(self._turns_a_pair)
+
+    def _turns_a_pair(self) -> bool:
+        status = self.status()
+        return _fastest_m_s(status) > 0.02 and "released" in _brakes(status)
 
     def brakes(self) -> list[str]:
         """States of the steering brakes, by the daemon's words."""
-        return [brake["state"] for brake in self.status()["brakes"]]
+        return _brakes(self.status())
 
     def speed_m_s(self) -> float:
         """The fastest wheel's speed."""
-        speeds = [abs(float(node["speed_m_s"])) for node in self.status()["nodes"] if "speed_m_s" in node]
-        return max(speeds)
+        return _fastest_m_s(self.status())
+
+
+def _brakes(status: dict[str, Any]) -> list[str]:
+    return [brake["state"] for brake in status["brakes"]]
+
+
+def _fastest_m_s(status: dict[str, Any]) -> float:
+    return max(abs(float(node["speed_m_s"])) for node in status["nodes"] if "speed_m_s" in node)
 
 
 def _described(*options: str, bus: str = BUS_SPEC) -> str:
