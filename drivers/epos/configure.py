@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 
-from canhelm.errors import Refused
+from canhelm.errors import DeviceFault, Refused
 from drivers.canopen.configuration import Configuration
 from drivers.canopen.device import Step
 from drivers.canopen.objects import ObjectDef
@@ -101,17 +101,23 @@ class EposSetup:
             )
 
     async def _stop(self) -> None:
-        """A drive that still turns is brought to rest by its ramp, then off; no life guarding while nobody guards.
+        """A drive that still turns is brought to rest by its ramp, then off; only then it needs no life guarding.
 
-        Its life guarding stays until it has been told to stop: nothing else stops it where it can be told no more.
+        Until it says that it is off, nothing but its life guarding stops it where it can be told no more.
         """
-        state = state_of(await self._sdo.read_int(OBJECTS["statusword"]))
-        powered = state is not None and state.power_stage_on
-        await self._sdo.write(OBJECTS["controlword"], Command.QUICK_STOP if powered else Command.DISABLE_VOLTAGE)
-        await self._written.write(((OBJECTS["life_time_factor"], 0), (OBJECTS["guard_time"], 0)))
-        if powered:
+        if await self._is_powered():
+            await self._sdo.write(OBJECTS["controlword"], Command.QUICK_STOP)
             await asyncio.sleep(self._config.max_speed_m_s / self._config.quick_stop_m_s2)
-            await self._sdo.write(OBJECTS["controlword"], Command.DISABLE_VOLTAGE)
+        await self._sdo.write(OBJECTS["controlword"], Command.DISABLE_VOLTAGE)
+        if await self._is_powered():
+            remedy = "its life guarding stops it, and it is tried again; if it stays so, switch its supply off and on"
+            raise DeviceFault(f"{self._who} does not switch off", node=self._sdo.node, remedy=remedy)
+        await self._written.write(((OBJECTS["life_time_factor"], 0), (OBJECTS["guard_time"], 0)))
+
+    async def _is_powered(self) -> bool:
+        """Whether its power stage is on, or it does not say so plainly."""
+        state = state_of(await self._sdo.read_int(OBJECTS["statusword"]))
+        return state is None or state.power_stage_on
 
     async def _clear_errors(self) -> None:
         await self._sdo.write(OBJECTS["controlword"], Command.FAULT_RESET)

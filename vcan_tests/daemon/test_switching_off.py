@@ -42,11 +42,14 @@ async def test_a_drive_that_hears_nothing_does_not_push_on_alone_when_the_others
         assert _powered(robot) == []
 
 
-async def test_a_turning_drive_that_is_configured_again_and_does_not_answer_stops_by_life_guarding() -> None:
+@pytest.mark.parametrize("deaf_at", ["0x6041", "0x6040", "0x100D", "0x100C"])
+async def test_a_turning_drive_that_is_configured_again_and_does_not_answer_stops_by_life_guarding(
+    deaf_at: str,
+) -> None:
     async with running_robot(expect_errors=True) as robot:
         driving = robot.begin("drive.parallel", angle_deg=0.0, speed_m_s=0.3, duration_s=5.0)
         await robot.until(lambda: robot.speed_m_s > 0.28)
-        await robot.call("simulation.fault", kind="sdo_timeout", part="front_left", object="0x6041")
+        await robot.call("simulation.fault", kind="sdo_timeout", part="front_left", object=deaf_at)
         await robot.call("simulation.fault", kind="lose", cob_id=0x703)
         await robot.until(lambda: robot.state == "fault", 0.5)
         await asyncio.sleep(1.0)
