@@ -17,8 +17,8 @@ from drivers.epos.transitions import TRANSITION_S
 from profiles.schema import PairedSteerGeometry, Profile
 
 SWING_S: Final = 0.08
-"""What tyres and a turning pair have stored turns wheels for this long after the ramp (docs/service.md: 0.446 s after
-`kill -9`, of which 0.375 s are life time and ramp)."""
+"""What tyres and a turning pair have stored turns wheels for this long after the ramp (docs/service.md: they stand
+0.45 s after `kill -9`, of which 0.41 s are life time and ramp)."""
 SETTLING_M: Final = 0.008
 """What a wheel may turn after that, as torque goes or comes: 1.3 mm where nothing else is wrong (docs/service.md), more
 where drives have worked against each other (docs/fault-campaign.md)."""
