@@ -277,8 +277,8 @@ class Course:
         state, error = self._supervisor.state, self._error
         outcome.stopped = error is not None or state in LATCHED
         outcome.told = error.message if error else self._supervisor.message
-        if outcome.stopped and (rested_s := self.judge.rested_s()) > outcome.at_s:
-            outcome.rest_s = round(rested_s - outcome.at_s, 3)
+        if outcome.stopped and self.judge.moved_s > outcome.at_s:
+            outcome.rest_s = round(self.judge.moved_s - outcome.at_s, 3)
         well = error is None and state is VehicleState.IDLE
         if not well and not self._is_named(outcome, error):
             self.judge.violated("message", f"state {state}, and told is {outcome.told!r}")

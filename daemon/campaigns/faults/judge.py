@@ -31,6 +31,7 @@ class Judge:
 
     Attributes:
         violations: what was wrong, a sentence for each invariant, by the invariant.
+        moved_s: when a wheel last turned faster than what counts as rest, settling included.
         live: whether a command may move anything now.
         reach: how drives hear of a stop, as far as is known.
         blocked: whether a wheel is held, so that the others are wound up.
@@ -41,6 +42,7 @@ class Judge:
     def __init__(self, app: App, limits: Limits) -> None:
         assert app.network is not None
         self.violations: dict[str, str] = {}
+        self.moved_s = 0.0
         self.live = False
         self.reach: Reach = "pdo"
         self.wild = self.blocked = False
@@ -57,7 +59,6 @@ class Judge:
         self._fastest_m_s = self._rest_by_s = self._off_by_s = 0.0
         self._notice_by_s = math.inf
         self._rested_m: tuple[float, ...] | None = None
-        self._ways_m: list[tuple[float, tuple[float, ...]]] = []
         self._free_since_s: dict[str, float] = {}
         self._timer: asyncio.TimerHandle | None = None
         self._log = _Defects(self)
@@ -98,7 +99,6 @@ class Judge:
         """Something breaks: a stop that is under way may take as long as if it began now."""
         self._notice_by_s = self._loop.time() + self._limits.noticed_s if silences else math.inf
         self.reach, self.wild = reach, wild
-        self._ways_m.clear()
         self.allow()
 
     def allow(self, slowing_m_s2: float | None = None) -> None:
@@ -113,12 +113,6 @@ class Judge:
         self._rest_by_s = max(self._rest_by_s, now_s + rest_s)
         self._off_by_s = max(self._off_by_s, self._rest_by_s + off_s)
         self._rested_m = None
-
-    def rested_s(self) -> float:
-        """When the wheels were where they stand now, but for what counts as settling; 0 where they stood since then."""
-        now_m = self._rolled_m()
-        moving = [time_s for time_s, way_m in self._ways_m if _farthest_m(way_m, now_m) > self._limits.settling_m]
-        return max(moving, default=0.0)
 
     def _rolled_m(self) -> tuple[float, ...]:
         """How far each rim has turned."""
@@ -148,7 +142,8 @@ class Judge:
         if self.live and self._app.supervisor.state in LATCHED:
             self.revoke()
         fastest_m_s = self.rim_m_s()
-        self._ways_m.append((now_s, self._rolled_m()))
+        if fastest_m_s >= self._limits.at_rest_m_s:
+            self.moved_s = now_s
         if not self.live:
             self._check_stopped(now_s)
         elif now_s > self._notice_by_s:

@@ -19,7 +19,7 @@ class Outcome:
         at_s: virtual time.
         stopped: whether it ended the manoeuvre by an error, or latched a stop.
         told: what the client was told, or the status said.
-        rest_s: from the injection until the last wheel stood, where it stopped a robot that moved.
+        rest_s: from the injection until the last wheel stood and had settled, where it stopped a robot that moved.
         recovered: by which action: ``nothing``, ``reset``; "" where it did not recover.
         violations: what was wrong, by invariant.
     """
