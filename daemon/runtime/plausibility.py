@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
 from canhelm.errors import DeviceFault
 from daemon.loops.measurement import Command, Measurement
@@ -35,6 +36,10 @@ _MISFIT_REMEDIES = {
 }
 
 
+OLD_CURRENT_MODE: Final = "expiring_position"
+"""Of the drive that a serial line is plugged into: its own current is read once in eight rounds, too seldom to judge."""
+
+
 class Plausibility:
     """Looks at each cycle's readings while anything has power.
 
@@ -55,7 +60,7 @@ class Plausibility:
         self._currents = tuple(
             (index, config.direction, CurrentAndMotion(current_limits(profile, config)))
             for index, drive in enumerate(vehicle.drives)
-            if (config := profile.drives.get(drive.name))
+            if (config := profile.drives.get(drive.name)) and config.mode != OLD_CURRENT_MODE
         )
 
     def look(

@@ -39,6 +39,13 @@ async def test_behind_a_gateway_with_the_framing_of_later_drives_it_boots_and_st
         assert math.degrees(robot.network.world.heading_rad("front")) == pytest.approx(30.0, abs=1.0)
 
 
+@pytest.mark.parametrize("pause_s", [0.0, 0.1, 0.2, 0.3, 0.4])
+async def test_an_old_reading_of_the_current_of_the_drive_on_the_line_stops_nobody(pause_s: float) -> None:
+    async with running_robot(bus="rs232@38400") as robot:
+        await asyncio.sleep(pause_s)
+        await robot.call("drive.parallel", angle_deg=0.0, speed_m_s=-0.7, duration_s=2.0)
+
+
 async def test_figure_4_16_has_its_radius_within_eight_percent() -> None:
     async with running_robot(bus="rs232") as robot:
         speed = robot.app.profile.limits.speed_m_s
