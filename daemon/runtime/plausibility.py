@@ -37,7 +37,7 @@ _MISFIT_REMEDIES = {
 
 
 OLD_CURRENT_MODE: Final = "expiring_position"
-"""Of the drive that a serial line is plugged into: its own current is read once in eight rounds, too seldom to judge."""
+"""Of the drive that a serial line is plugged into: its current is read once in eight rounds, too seldom to judge."""
 
 
 class Plausibility:
