@@ -219,9 +219,8 @@ class PythonCanBus(Bus):
 
     def _listen(self, link: can.BusABC) -> None:
         """Begin to receive; an interface that is down says so at the first reading."""
-        try:
-            self._fd = link.fileno()
-        except NotImplementedError:  # from python-can: no descriptor, as slcan over rfc2217://
+        self._fd = _descriptor_of(link)
+        if self._fd is None:
             self._reader = threading.Thread(target=self._read_until_closed, args=(link,), daemon=True, name=self.name)
             self._reader.start()
         else:
@@ -266,6 +265,18 @@ class PythonCanBus(Bus):
     def remedy(self) -> str:
         """What to look at where the adapter does not work."""
         return "is the adapter plugged in, may this user open it, and are its driver and python-can extra installed?"
+
+
+def _descriptor_of(link: can.BusABC) -> int | None:
+    """The file descriptor that tells when a link can be read; None where a thread has to wait for it.
+
+    That there is none python-can says by an error alone (``BusABC.fileno``): adapters that are asked through a maker's
+    library, and slcan over ``rfc2217://``.
+    """
+    try:
+        return link.fileno()
+    except NotImplementedError:
+        return None
 
 
 def _error_number(error: Exception) -> int | None:
