@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -13,7 +12,7 @@ from cyclopts import App, Parameter
 from cyclopts.validators import Number
 
 from daemon.cli.campaign_faults import faults
-from daemon.cli.campaign_options import Out, Workers, progress_bar
+from daemon.cli.campaign_options import Out, Workers, work_off
 from daemon.cli.output import Json, console, say, show, wants_json, words
 from daemon.cli.pictures import can_draw
 
@@ -98,22 +97,14 @@ def drive_missing(cases: Sequence[Case], out: Path, workers: int | None, dask: s
 
     with opened(out, cases) as results:
         missing = results.missing
-        if len(missing) < len(cases):
-            say(f"{len(cases) - len(missing)} of {len(cases)} runs are there already")
         count = workers or len(os.sched_getaffinity(0))
-        begin = time.perf_counter()
-        try:
-            with progress_bar() as progress:
-                bar = progress.add_task("runs", total=len(cases), completed=len(cases) - len(missing))
-                for batch in drive_all(missing, count, dask):
-                    results.keep(batch)
-                    progress.advance(bar, len(batch))
-        except KeyboardInterrupt:
-            say(f"{len(results.finished)} of {len(cases)} runs are kept in {out}; the same command goes on")
-            raise
-        if missing:
-            took, where = time.perf_counter() - begin, dask or f"{count} workers"
-            say(f"{len(missing)} runs in {took:.1f} s with {where}: {len(missing) / took:.3g} runs/s")
+
+        def kept() -> Iterator[int]:
+            for batch in drive_all(missing, count, dask):
+                results.keep(batch)
+                yield len(batch)
+
+        work_off("runs", len(cases) - len(missing), len(cases), out, dask or f"{count} workers", kept())
         write_parquet(results, out)
         return results.in_order()
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,7 +11,7 @@ from cyclopts import Parameter
 from cyclopts.validators import Number
 
 from canhelm.errors import UsageError
-from daemon.cli.campaign_options import Out, Workers, progress_bar
+from daemon.cli.campaign_options import Out, Workers, work_off
 from daemon.cli.output import Json, console, plain, say, show, wants_json, words
 from daemon.cli.pictures import can_draw
 
@@ -69,21 +68,13 @@ def _try(plan: Sequence[Injection], seed: int, out: Path, workers: int, json: bo
 
     with opened(out, seed) as results:
         missing = [injection for injection in plan if injection not in results.tried]
-        if len(missing) < len(plan):
-            say(f"{len(plan) - len(missing)} of {len(plan)} injections are there already")
-        begin = time.perf_counter()
-        try:
-            with progress_bar() as progress:
-                bar = progress.add_task("injections", total=len(plan), completed=len(plan) - len(missing))
-                for outcome in outcomes_of(missing, seed, workers):
-                    results.keep(outcome)
-                    progress.advance(bar)
-        except KeyboardInterrupt:
-            say(f"{len(results.tried)} of {len(plan)} injections are kept in {out}; the same command goes on")
-            raise
-        if missing:
-            took = time.perf_counter() - begin
-            say(f"{len(missing)} injections in {took:.1f} s with {workers} workers: {len(missing) / took:.3g} a second")
+
+        def kept() -> Iterator[int]:
+            for outcome in outcomes_of(missing, seed, workers):
+                results.keep(outcome)
+                yield 1
+
+        work_off("injections", len(plan) - len(missing), len(plan), out, f"{workers} workers", kept())
         tried = [results.tried[injection] for injection in plan]
     say(f"table and violations: {write_summary(out, seed, tried)}")
     _show(tried, json)
