@@ -13,7 +13,7 @@ PACKAGED = $(shell find canhelm daemon drivers profiles packaging systemd -type 
 PACKAGING = DESTDIR='$(DESTDIR)' PREFIX='$(PREFIX)' PYTHON='$(SERVICE_PYTHON)' PIP_PYTHON='$(VENV)/bin/python'
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo docs test lint fuzz long-life vcan-test vcan-figures install uninstall deb client-wheel
+.PHONY: help venv demo docs test lint bench fuzz long-life vcan-test vcan-figures install uninstall deb client-wheel
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST)
@@ -37,6 +37,9 @@ fuzz: $(VENV)/.stamp-test ## any input to every reader and every wire: MINUTES=1
 
 long-life: $(VENV)/.stamp-test ## 12 virtual hours among people, programs and faults, in about one; figures into long-life-out/
 	$(VENV)/bin/python -m vcan_tests.long_life $(ARGS)
+
+bench: $(VENV)/.stamp-test ## what canhelm costs and how fast it is here, into bench-out/; ARGS='--vcan' or ARGS='PART ...'
+	$(VENV)/bin/python -m benchmarks $(ARGS)
 
 vcan-test: $(VENV)/.stamp-test ## the tests on a kernel's CAN bus and under a real systemd, both booted if need be
 	$(VENV)/bin/python -m vcan_tests.kernel.suite $(ARGS)

@@ -1,0 +1,94 @@
+"""``python -m benchmarks [PART ...] --out bench-out``: what canhelm costs and how fast it is on this machine.
+
+A part is a module here with ``run(options) -> Section``. All of them, one after the other, take about ten minutes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import os
+import platform
+import sys
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table as Grid
+
+from benchmarks.section import Options, Section, Table
+from canhelm import __version__
+from daemon.cli.output import console, words
+from vcan_tests.arguments import positive
+
+PARTS = ("simulation",)
+"""In the order in which they run."""
+RESULTS = "bench.json"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Measure what was asked for; what an earlier run found of other parts stays in the results."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)} (default: all)")
+    parser.add_argument("--out", type=Path, default=Path("bench-out"), help="folder for figures and pictures")
+    parser.add_argument("--seconds", type=positive, default=10.0, help="of each measurement (default 10)")
+    parser.add_argument("--vcan", action="store_true", help="measure on a kernel's CAN, too; it is booted if need be")
+    asked = parser.parse_args(argv)
+    if unknown := sorted(set(asked.parts) - set(PARTS)):
+        parser.error(f"no such part: {', '.join(unknown)}; there are {', '.join(PARTS)}")
+    asked.out.mkdir(parents=True, exist_ok=True)
+    logging.getLogger("canhelm").setLevel(logging.ERROR)
+    with console(stderr=True).status("") as shown:
+        for name in asked.parts or PARTS:
+
+            def tell(words: str, name: str = name) -> None:
+                shown.update(f"{name}: {words}")
+
+            tell("begins")
+            section = measure(name, Options(asked.out, asked.seconds, asked.vcan, tell))
+            keep(section, asked.out / RESULTS)
+            for table in section.tables:
+                console().print(grid(table))
+            for picture in section.pictures:
+                console().print(f"picture: {picture}")
+    return 0
+
+
+def measure(name: str, options: Options) -> Section:
+    """Run one part."""
+    section: Section = import_module(f"benchmarks.{name}").run(options)
+    return section
+
+
+def keep(section: Section, path: Path) -> None:
+    """Put a part's figures into the results, in place of older ones of that part."""
+    results: dict[str, Any] = json.loads(path.read_text()) if path.exists() else {}
+    results[section.name] = {"measured": _circumstances(), **section.figures}
+    path.write_text(json.dumps(results, indent=2) + "\n")
+
+
+def _circumstances() -> dict[str, Any]:
+    """On what machine, and when."""
+    return {
+        "at": datetime.now(UTC).isoformat(timespec="seconds"),
+        "canhelm": __version__,
+        "python": platform.python_version(),
+        "kernel": platform.release(),
+        "processors": len(os.sched_getaffinity(0)),
+        "load": round(os.getloadavg()[0], 2),
+    }
+
+
+def grid(table: Table) -> Grid:
+    """A table for a terminal."""
+    drawn = Grid(*table.heads, title=table.title, title_justify="left", box=None, header_style="bold")
+    for row in table.rows:
+        drawn.add_row(*(words(value, 3) for value in row))
+    return drawn
+
+
+if __name__ == "__main__":
+    sys.exit(main())
