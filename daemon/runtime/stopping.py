@@ -262,13 +262,16 @@ class Stopping:
         A wheel that does not come to rest within the time that its ramp needs is reported; waiting ends then.
         """
         if not await self.rest.until_rest(self._vehicle.stopping_time_s() + OVERRUN_S):
-            moving = [drive.name for drive in self._drives if abs(drive.speed_m_s) > AT_REST_M_S]
-            self._log.add(
-                "error",
-                "supervisor",
-                f"not at rest in the time that the ramp needs: {', '.join(moving)}",
-                "is the vehicle on a slope, or a wheel pushed by hand?",
-            )
+            self._report_unrest([drive.name for drive in self._drives if abs(drive.speed_m_s) > AT_REST_M_S])
+
+    def _report_unrest(self, moving: list[str]) -> None:
+        if moving:
+            told = f"not at rest in the time that the ramp needs: {', '.join(moving)}"
+            remedy = "is the vehicle on a slope, or a wheel pushed by hand?"
+        else:
+            told = "slow now, but not seen at rest for long enough in the time that the ramp needs"
+            remedy = "were control cycles late, or is the line slow? see `canhelm status`"
+        self._log.add("error", "supervisor", told, remedy)
 
     def _on_failure(self, error: DeviceFault) -> None:
         """A fault, unless one has stopped the vehicle already: that stop goes on."""

@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from daemon.runtime.rest import AT_REST_CYCLES
+from daemon.runtime.rest import AT_REST_CYCLES, RestWatch
 from daemon.runtime.stopping import OVERRUN_S
 from vcan_tests.robot import Robot, running_robot
 
@@ -68,3 +68,23 @@ async def test_a_wheel_that_does_not_brake_is_switched_off_soon_after_its_ramp_s
         await asyncio.sleep(ramp_s + OVERRUN_S + 0.1)
         assert _powered(robot) == []
         await driving
+
+
+async def test_a_stop_that_too_few_cycles_have_watched_tells_so_and_names_no_wheel(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async with running_robot(expect_errors=True) as robot:
+        monkeypatch.setattr(RestWatch, "look", lambda *_: None)
+        await robot.call("stop")
+        told = [event["message"] for event in robot.app.supervisor.log.events]
+        assert told[-1] == "slow now, but not seen at rest for long enough in the time that the ramp needs"
+
+
+async def test_a_stop_on_which_a_wheel_goes_on_turning_names_the_wheel() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        driving = robot.begin("drive.parallel", angle_deg=0.0, speed_m_s=0.3, duration_s=5.0)
+        await robot.until(lambda: robot.speed_m_s > 0.28)
+        await robot.call("simulation.fault", kind="encoder_reversed", part="front_left")
+        await driving
+        told = [event["message"] for event in robot.app.supervisor.log.events]
+        assert "not at rest in the time that the ramp needs: front_left" in told
