@@ -11,7 +11,8 @@ import logging
 import os
 import platform
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from importlib import import_module
 from pathlib import Path
@@ -24,37 +25,51 @@ from canhelm import __version__
 from daemon.cli.output import console, words
 from vcan_tests.arguments import positive
 
-PARTS = ("simulation",)
+PARTS = ("latency", "jitter", "process", "simulation", "nodes", "rates", "serial", "campaigns")
 """In the order in which they run."""
+BOOTED = ("vcan",)
+"""Runs when it is asked for: needs a kernel's CAN."""
 RESULTS = "bench.json"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure what was asked for; what an earlier run found of other parts stays in the results."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)} (default: all)")
-    parser.add_argument("--out", type=Path, default=Path("bench-out"), help="folder for figures and pictures")
-    parser.add_argument("--seconds", type=positive, default=10.0, help="of each measurement (default 10)")
-    parser.add_argument("--vcan", action="store_true", help="measure on a kernel's CAN, too; it is booted if need be")
-    asked = parser.parse_args(argv)
-    if unknown := sorted(set(asked.parts) - set(PARTS)):
-        parser.error(f"no such part: {', '.join(unknown)}; there are {', '.join(PARTS)}")
+    asked = _parse(argv)
     asked.out.mkdir(parents=True, exist_ok=True)
     logging.getLogger("canhelm").setLevel(logging.ERROR)
-    with console(stderr=True).status("") as shown:
-        for name in asked.parts or PARTS:
-
-            def tell(words: str, name: str = name) -> None:
-                shown.update(f"{name}: {words}")
-
-            tell("begins")
-            section = measure(name, Options(asked.out, asked.seconds, asked.vcan, tell))
-            keep(section, asked.out / RESULTS)
-            for table in section.tables:
-                console().print(grid(table))
-            for picture in section.pictures:
-                console().print(f"picture: {picture}")
+    for name in asked.parts or PARTS + BOOTED * asked.vcan:
+        with _progress(name) as tell:
+            section = measure(name, Options(asked.out, asked.seconds, tell))
+        keep(section, asked.out / RESULTS)
+        for table in section.tables:
+            console().print(grid(table), "")
+        for picture in section.pictures:
+            console().print(f"picture: {picture}")
     return 0
+
+
+def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
+    known = PARTS + BOOTED
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(known)} (default: all but vcan)")
+    parser.add_argument("--out", type=Path, default=Path("bench-out"), help="folder for figures and pictures")
+    parser.add_argument("--seconds", type=positive, default=10.0, help="of each measurement (default 10)")
+    parser.add_argument("--vcan", action="store_true", help="the part vcan, too, on a kernel that is booted if need be")
+    asked = parser.parse_args(argv)
+    if unknown := sorted(set(asked.parts) - set(known)):
+        parser.error(f"no such part: {', '.join(unknown)}; there are {', '.join(known)}")
+    return asked
+
+
+@contextmanager
+def _progress(name: str) -> Iterator[Callable[[str], None]]:
+    """Shows on a terminal what a part is at."""
+    shown = console(stderr=True)
+    if not shown.is_terminal:
+        yield lambda _: None
+        return
+    with shown.status(name) as status:
+        yield lambda words: status.update(f"{name}: {words}")
 
 
 def measure(name: str, options: Options) -> Section:

@@ -19,13 +19,11 @@ class Options:
     Attributes:
         out: folder for pictures.
         seconds: how long each measurement lasts, in the time that it measures.
-        vcan: measure on the kernel's CAN, too.
         tell: hears a few words at each step.
     """
 
     out: Path
     seconds: float = 10.0
-    vcan: bool = False
     tell: Callable[[str], None] = _silent
 
 

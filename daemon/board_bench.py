@@ -94,7 +94,7 @@ async def bench(profile: Profile, bus: str, duration_s: float, tell: Callable[[s
     for hz in RATES_HZ:
         tell(f"{hz:g} cycles a second for {duration_s / len(RATES_HZ):.1f} s")
         try:
-            results.append(await _measure(profile, bus, hz, duration_s / len(RATES_HZ)))
+            results.append(await measure_rate(profile, bus, hz, duration_s / len(RATES_HZ)))
         except Timeout as error:
             if not results:
                 raise
@@ -106,7 +106,8 @@ async def bench(profile: Profile, bus: str, duration_s: float, tell: Callable[[s
     return {"highest_safe_hz": max(safe, default=None), "bus": bus, "rates": [asdict(result) for result in results]}
 
 
-async def _measure(profile: Profile, bus: str, hz: float, duration_s: float) -> RateResult:
+async def measure_rate(profile: Profile, bus: str, hz: float, duration_s: float) -> RateResult:
+    """Run the daemon at one rate; arguments and errors as in :func:`bench`."""
     app = App(replace(profile, network=replace(profile.network, cycle_hz=hz)), bus)
     await app.start()
     try:

@@ -1,0 +1,87 @@
+"""What control cycles load: the wire, and the processor with the daemon's share of it. On virtual time."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+from statistics import median
+
+from benchmarks.robots import Scene, begin, booted
+from benchmarks.share import DaemonShare
+from daemon.demo_robot import DemoRobot
+from daemon.runtime.clock import run_virtual
+from drivers.bus.wire_time import frame_bits
+from profiles.schema import Profile
+
+TIMES = 5
+FIRST_SERVICE_ID = 0x580
+"""Identifiers from here on are not of the control cycle: SDO, guarding."""
+
+
+@dataclass(frozen=True)
+class Load:
+    """What the control cycles of one robot load.
+
+    Attributes:
+        cycles: measured.
+        late: of these, those that ended after their period.
+        incomplete: of these, those whose step ran without some reading.
+        lost: frames that were not sent in time, or for which there was no room.
+        bits: of SYNC and PDOs in a cycle, with their stuff bits.
+        wire_share: share of the time that the wire was busy, guarding included.
+        daemon_us: the daemon's time in a cycle, the median of several measurements.
+    """
+
+    cycles: int
+    late: int
+    incomplete: int
+    lost: int
+    bits: float
+    wire_share: float
+    daemon_us: float
+
+
+class CycleBits:
+    """Counts bits of SYNC and PDOs. Add :meth:`see` to a bus' taps."""
+
+    def __init__(self) -> None:
+        self.bits = 0
+
+    def see(self, can_id: int, data: bytes, timestamp_s: float) -> None:
+        """Take a frame."""
+        if can_id < FIRST_SERVICE_ID:
+            self.bits += frame_bits(can_id, data)
+
+
+def load_of(profile: Profile, scene: Scene, seconds: float, settle_s: float) -> Load:
+    """Run a robot on virtual time, so long after its boot-up, for so long. Raises Timeout where it does not boot."""
+    return run_virtual(_load_of(profile, scene, seconds, settle_s))
+
+
+async def _load_of(profile: Profile, scene: Scene, seconds: float, settle_s: float) -> Load:
+    share = DaemonShare()
+    with share.of_ticks():
+        async with booted(profile) as robot:
+            share.of_frames(robot.app)
+            await begin(robot, scene)
+            await asyncio.sleep(settle_s)
+            return await _watch(robot, share, seconds)
+
+
+async def _watch(robot: DemoRobot, share: DaemonShare, seconds: float) -> Load:
+    app, medium, counted, spans_us = robot.app, robot.app.medium, CycleBits(), []
+    assert medium is not None
+    app.bus.taps.append(counted.see)
+    before, busy_s = _counts(robot), medium.busy_s
+    for _ in range(TIMES):
+        begun, spent_s = app.cycle.counters.cycles, share.spent_s
+        await asyncio.sleep(seconds / TIMES)
+        spans_us.append(1e6 * (share.spent_s - spent_s) / (app.cycle.counters.cycles - begun))
+    cycles, late, incomplete, lost = (now - then for now, then in zip(_counts(robot), before, strict=True))
+    wire_share = (medium.busy_s - busy_s) / seconds
+    return Load(cycles, late, incomplete, lost, counted.bits / cycles, wire_share, median(spans_us))
+
+
+def _counts(robot: DemoRobot) -> tuple[int, int, int, int]:
+    cycle, sent = robot.app.cycle.counters, robot.app.bus.counters
+    return cycle.cycles, cycle.late_cycles, cycle.incomplete, sent.dropped_stale + sent.dropped_full

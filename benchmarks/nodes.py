@@ -1,0 +1,101 @@
+"""What a node costs: the daemon's time in a cycle and the bits on the wire, from 2 nodes to 127."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import linear_regression
+
+from msgspec.structs import replace
+
+from benchmarks.bus_limit import cycle_bits
+from benchmarks.load import Load, load_of
+from benchmarks.pictures import COLOURS, panels, saved
+from benchmarks.robots import ROBOT, STANDING
+from benchmarks.section import Options, Section, Table
+from profiles.loader import load
+from profiles.schema import Profile
+
+COUNTS = (2, 6, 16, 32, 64, 127)
+CYCLE_HZ = 20.0
+"""What the wire carries with 127 drives."""
+BIT_RATE = 1_000_000
+SETTLE_S = 1.0
+
+
+@dataclass(frozen=True)
+class Line:
+    """The straight line through costs.
+
+    Attributes:
+        each: cost of one more.
+        none: cost without any.
+        residual: largest distance of a cost from the line.
+    """
+
+    each: float
+    none: float
+    residual: float
+
+
+def fit(counts: Sequence[float], costs: Sequence[float]) -> Line:
+    """The straight line with the least squares."""
+    each, none = linear_regression(counts, costs)
+    residual = max(abs(cost - none - each * count) for count, cost in zip(counts, costs, strict=True))
+    return Line(each, none, residual)
+
+
+def drives_only(count: int, cycle_hz: float) -> Profile:
+    """So many wheel drives on stands, without a vehicle."""
+    profile = load(ROBOT).profile
+    drive = profile.drives["rear_left"]
+    return replace(
+        profile,
+        network=replace(profile.network, cycle_hz=cycle_hz),
+        drives={f"drive_{node}": replace(drive, node=node) for node in range(1, count + 1)},
+        encoders={},
+        brakes={},
+        vehicle=None,
+    )
+
+
+def run(options: Options, counts: Sequence[int] = COUNTS) -> Section:
+    """Drives that stand; every one of them sends its readings and gets its targets in each cycle."""
+    loads: dict[int, Load] = {}
+    for count in counts:
+        options.tell(f"{count} nodes")
+        loads[count] = load_of(drives_only(count, CYCLE_HZ), STANDING, options.seconds, SETTLE_S)
+    line = fit(list(loads), [found.daemon_us for found in loads.values()])
+    rows = [(count, found.daemon_us, *_on_the_wire(count, found)) for count, found in loads.items()]
+    title = (
+        f"the daemon's time in a cycle: {line.each:.2f} us a node and {line.none:.0f} us, "
+        f"at most {line.residual:.0f} us beside that line; {CYCLE_HZ:g} Hz, virtual time"
+    )
+    heads = ("drives", "daemon [us]", "bits", "least bits", "most bits", "the wire's limit [Hz]")
+    figures = {
+        "node_us": line.each,
+        "without_nodes_us": line.none,
+        "residual_us": line.residual,
+        "counts": {str(count): {"daemon_us": found.daemon_us, "bits": found.bits} for count, found in loads.items()},
+    }
+    return Section("nodes", [Table(title, heads, rows)], figures, [_draw(loads, line, options.out / "nodes.png")])
+
+
+def _on_the_wire(count: int, found: Load) -> tuple[float, ...]:
+    return (found.bits, *cycle_bits(count), BIT_RATE / found.bits)
+
+
+def _draw(loads: dict[int, Load], line: Line, path: Path) -> Path:
+    counts = list(loads)
+    figure, (cost, limit) = panels(1, 2, (12, 4.5))
+    cost.plot(counts, [found.daemon_us for found in loads.values()], "o", color=COLOURS[0])
+    ends = [0, max(counts)]
+    cost.plot(ends, [line.none + line.each * end for end in ends], color="black", linewidth=0.9)
+    cost.set(title=f"{line.each:.2f} µs a node", xlabel="drives", ylabel="the daemon's time in a cycle [µs]")
+    limit.plot(counts, [BIT_RATE / found.bits for found in loads.values()], "o-", color=COLOURS[0], label="the wire")
+    by_daemon = [1e6 / found.daemon_us for found in loads.values()]
+    limit.plot(counts, by_daemon, "s-", color=COLOURS[1], label="the daemon alone")
+    limit.set(title="limits", xlabel="drives", ylabel="cycles a second", xscale="log", yscale="log")
+    limit.legend(fontsize="small")
+    return saved(figure, path)
