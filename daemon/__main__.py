@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
+from collections.abc import Callable
 
 INTERRUPTED = 130
 
@@ -18,11 +20,20 @@ def main() -> int:
     try:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         _replace_closed_outputs()
-        from daemon.cli.main import main as run
-
+        run = _load()
         return run()
     except KeyboardInterrupt:
         return INTERRUPTED
+
+
+def _load() -> Callable[[], int]:
+    """The command line; what it has loaded lives as long as the process, and no collection of garbage looks at it."""
+    gc.disable()
+    from daemon.cli.main import main as run
+
+    gc.freeze()
+    gc.enable()
+    return run
 
 
 def _replace_closed_outputs() -> None:

@@ -187,6 +187,9 @@ def _throw_output_away() -> None:
 
 
 def _run(argv: Sequence[str]) -> int:
+    if list(argv) == ["--version"]:
+        print(__version__)  # cyclopts would load rich for it
+        return 0
     app = build_app()
     if not argv or argv[0] in app.help_flags:
         app = whole_app()

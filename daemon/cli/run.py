@@ -17,7 +17,7 @@ from cyclopts import Parameter
 
 from canhelm import protocol
 from canhelm.errors import ConfigError, UsageError
-from daemon.cli import journal
+from daemon.cli.logs import log_to_stderr
 from daemon.cli.output import say
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def run(
     served_over_tcp = tcp_access(tcp, tokens)
     for given in (socket, gateway):
         _require_folder(given)
-    journal.log_to_stderr(os.environ)
+    log_to_stderr(os.environ)
     faulthandler.enable()  # a watchdog ends a hung daemon by SIGABRT: tell where it hangs
     inherited = inherited_sockets(os.environ, os.getpid())
     path = socket or _api_socket(inherited) or Path(protocol.default_socket(robot.name))

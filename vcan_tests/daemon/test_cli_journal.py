@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from canhelm.errors import Refused
-from daemon.cli import journal
+from daemon.cli import journal, logs
 from daemon.cli.output import say, say_error
 
 
@@ -23,7 +23,7 @@ def record(level: int, message: str) -> logging.LogRecord:
     [(logging.DEBUG, "<7>"), (logging.INFO, "<6>"), (logging.WARNING, "<4>"), (logging.CRITICAL, "<3>")],
 )
 def test_each_level_has_its_prefix(level: int, prefix: str) -> None:
-    assert journal.JournalFormatter("%(message)s").format(record(level, "told")) == f"{prefix}told"
+    assert logs.JournalFormatter("%(message)s").format(record(level, "told")) == f"{prefix}told"
 
 
 def test_each_line_of_a_traceback_has_the_level_of_its_record() -> None:
@@ -32,7 +32,7 @@ def test_each_line_of_a_traceback_has_the_level_of_its_record() -> None:
         raise ValueError("of all")
     except ValueError:
         failed.exc_info = sys.exc_info()
-    lines = journal.JournalFormatter("%(message)s").format(failed).splitlines()
+    lines = logs.JournalFormatter("%(message)s").format(failed).splitlines()
     assert len(lines) > 3
     assert {line[:3] for line in lines} == {"<3>"}
 

@@ -234,13 +234,6 @@ def test_follow_streams_json_lines_and_ends_quietly_with_its_reader(server: Serv
     assert {line["robot"] for line in lines} == {"fake"}
 
 
-def test_status_loads_none_of_the_daemons_libraries(server: Server) -> None:
-    code = "import sys; from daemon.cli.main import main; main(['status']); print(*sys.modules, file=sys.stderr)"
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stderr
-    loaded = {name.split(".")[0] for name in told.split()}
-    assert not loaded & {"can", "canopen", "numpy", "msgspec", "yaml", "rich", "drivers", "profiles"}
-
-
 @pytest.mark.parametrize("line", ["--help", "completion bash"])
 def test_a_full_disk_is_one_sentence(line: str) -> None:
     with open("/dev/full", "w") as full:
