@@ -48,7 +48,7 @@ def replay(file: Path, /, *, profile: str | None = None, every: float = 0.1, jso
         )
     if records is not None:
         return _compute_again(robot, records, json)
-    replayed = run_virtual(decode(robot, _frames(file), every))
+    replayed = run_virtual(decode(robot, frames_of(file), every))
     say(f"{replayed.frames} frames, of which the daemon reads {replayed.read}; {replayed.malformed} malformed")
     rows = sorted([*replayed.rows, *replayed.events], key=lambda row: float(row["time_s"]))
     show(rows, _table, json)
@@ -93,7 +93,7 @@ def _compute_again(robot: Profile, lines: list[bytes], json: Json) -> int:
     return 1 if found.difference else 0
 
 
-def _frames(file: Path) -> Iterator[LogFrame]:
+def frames_of(file: Path) -> Iterator[LogFrame]:
     """The frames of a log. Raises ConfigError where it has none, UsageError where it cannot be read."""
     found = others = 0
     try:

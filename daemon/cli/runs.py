@@ -11,6 +11,7 @@ from cyclopts import App, Parameter
 
 from canhelm.errors import UsageError
 from daemon.cli.output import Json, say, show
+from daemon.cli.replay import frames_of
 from daemon.runs import store
 from daemon.runs.signs import read_signs
 from daemon.runs.store import FAULT, LAST, OFF, PROFILE, Run
@@ -24,6 +25,8 @@ runs = App(name="runs", help="Runs: each motion of a daemon leaves one. Without 
 Folder = Annotated[str | None, Parameter(name="--runs", help="Folder of runs, as given to `canhelm run --runs`.")]
 Robot = Annotated[str | None, Parameter(help="Runs of this robot alone.")]
 """Types of the options that choose among runs."""
+LOG = ".log"
+"""The ending of what is a log of a bus and no run."""
 
 
 @runs.default
@@ -84,15 +87,18 @@ def export(
     robot: Robot = None,
     json: Json = None,
 ) -> None:
-    """Write a run as one MCAP file, which Foxglove, PlotJuggler and Rerun open.
+    """Write a run as one MCAP file, which Foxglove, PlotJuggler and Rerun open; or the log of a bus.
 
     Example: `canhelm runs export last --mcap run.mcap`
 
     Args:
-        name: Number of a run, or last.
+        name: Number of a run, or last; or a candump log, as `canhelm run --record` writes it.
     """
-    from daemon.runs.mcap_file import write_mcap
+    from daemon.runs.mcap_file import write_log, write_mcap
 
+    if name.endswith(LOG):
+        show({"log": name, "file": str(mcap), "messages": write_log(frames_of(Path(name)), mcap)}, json=json)
+        return
     run = store.choose(find_runs(folder, robot), name)
     show({"run": run.number, "file": str(mcap), "messages": write_mcap(run, mcap)}, json=json)
 

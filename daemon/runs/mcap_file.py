@@ -1,13 +1,14 @@
-"""A run as one MCAP file (mcap.dev, format specification), which Foxglove, PlotJuggler and Rerun open."""
+"""A run, or a log of a bus, as one MCAP file (mcap.dev), which Foxglove, PlotJuggler and Rerun open."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from importlib.util import find_spec
+from itertools import chain
 from pathlib import Path
-from typing import Any, Final
+from typing import IO, Any, Final
 
 import msgspec
 
@@ -15,7 +16,7 @@ from canhelm import __version__
 from canhelm.errors import CanhelmError, ConfigError, UsageError
 from daemon.runs.store import DRIVES, EVENTS, FACTS, FRAMES, PROFILE, RECORDS, TERMS, Run
 from daemon.runs.table import read_table
-from drivers.bus.candump import parse_line
+from drivers.bus.candump import LogFrame, parse_line
 from drivers.bus.contract import ID_MASK, RTR_FLAG
 
 JSON_LINES: Final = {"/terms": TERMS, "/records": RECORDS, "/events": EVENTS}
@@ -42,12 +43,36 @@ def write_mcap(run: Run, path: Path) -> dict[str, int]:
         ConfigError: the run is damaged.
         CanhelmError: the file cannot be written.
     """
+    _require_library()
+    messages = list(_messages(run))
+    attached = {name: run.folder / name for name in (FACTS, PROFILE, DRIVES) if (run.folder / name).is_file()}
+    return _write(path, messages, {name: file.read_bytes() for name, file in attached.items()}, _begun_unix_s(run))
+
+
+def write_log(frames: Iterable[LogFrame], path: Path) -> dict[str, int]:
+    """Write the frames of a candump log as a channel of JSON; what it returns and raises is as for a run.
+
+    Args:
+        frames: of the log, one at least. What is wrong with the first one is told before there is a file.
+        path: a file that is not there yet.
+    """
+    _require_library()
+    left = iter(frames)
+    first = next(left)
+    return _write(path, map(_frame, chain((first,), left)), {}, first.timestamp_s)
+
+
+def _require_library() -> None:
     if find_spec("mcap") is None:
         raise UsageError("mcap is not installed", remedy="pip install 'canhelm[mcap]'")
-    messages = list(_messages(run))
+
+
+def _write(
+    path: Path, messages: Iterable[Message], attached: Mapping[str, bytes], begun_unix_s: float
+) -> dict[str, int]:
     try:
         with path.open("xb") as file:
-            return _write(run, messages, file)
+            return _fill(file, messages, attached, begun_unix_s)
     except FileExistsError:
         raise UsageError(f"{path} is there already", value=str(path), remedy="name another file") from None
     except OSError as error:
@@ -56,15 +81,16 @@ def write_mcap(run: Run, path: Path) -> dict[str, int]:
         ) from error
 
 
-def _write(run: Run, messages: Iterable[Message], file: Any) -> dict[str, int]:
+def _fill(
+    file: IO[bytes], messages: Iterable[Message], attached: Mapping[str, bytes], begun_unix_s: float
+) -> dict[str, int]:
     from mcap.writer import Writer
 
     writer = Writer(file)
     writer.start(library=f"canhelm {__version__}")
-    for name in (FACTS, PROFILE, DRIVES):
-        if (run.folder / name).is_file():
-            begun_ns = round(_begun_unix_s(run) * NS)
-            writer.add_attachment(begun_ns, begun_ns, name, "application/yaml", (run.folder / name).read_bytes())
+    begun_ns = round(begun_unix_s * NS)
+    for name, data in attached.items():
+        writer.add_attachment(begun_ns, begun_ns, name, "application/yaml", data)
     channels: dict[str, int] = {}
     counts: Counter[str] = Counter()
     for topic, time_s, content in messages:
@@ -105,17 +131,19 @@ def _messages(run: Run) -> Iterator[Message]:
     for line in _lines(run.folder / FRAMES):
         frame = parse_line(line)
         if frame is not None:
-            yield (
-                FRAMES_CHANNEL,
-                frame.timestamp_s,
-                {
-                    "interface": frame.interface,
-                    "id": frame.can_id & ID_MASK,
-                    "id_hex": f"{frame.can_id & ID_MASK:03X}",
-                    "remote": bool(frame.can_id & RTR_FLAG),
-                    "data_hex": frame.data.hex().upper(),
-                },
-            )
+            yield _frame(frame)
+
+
+def _frame(frame: LogFrame) -> Message:
+    can_id = frame.can_id & ID_MASK
+    content = {
+        "interface": frame.interface,
+        "id": can_id,
+        "id_hex": f"{can_id:03X}",
+        "remote": bool(frame.can_id & RTR_FLAG),
+        "data_hex": frame.data.hex().upper(),
+    }
+    return FRAMES_CHANNEL, frame.timestamp_s, content
 
 
 def _cycles(run: Run) -> Iterator[dict[str, Any]]:

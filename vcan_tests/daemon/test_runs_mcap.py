@@ -140,3 +140,26 @@ async def test_the_command_writes_the_file_and_tells_what_is_in_it(
     assert main(["runs", "export", "1", "--mcap", str(file), "--runs", str(tmp_path / "runs")]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["messages"]["/cycles"] == read_yaml(run.folder / FACTS)["rows"] == len(read(file)["/cycles"])
+
+
+def exported(log: Path) -> int:
+    return main(["runs", "export", str(log), "--mcap", str(log.with_suffix(".mcap"))])
+
+
+def test_a_log_of_the_bus_becomes_a_file_with_its_frames(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = tmp_path / "candump-max2d-1.log"
+    log.write_text("(1700000000.250000) can0 080#\n(1700000000.251000) can0 181#3706\n(1700000000.25")
+    assert exported(log) == 0
+    assert json.loads(capsys.readouterr().out)["messages"] == {"/frames": 2}
+    sync, status = read(log.with_suffix(".mcap"))["/frames"]
+    assert sync[0] == pytest.approx(1_700_000_000.25, abs=1e-5)
+    assert status[1] == {"interface": "can0", "id": 0x181, "id_hex": "181", "remote": False, "data_hex": "3706"}
+
+
+@pytest.mark.parametrize(("content", "code"), [(None, 2), ("no frame\n", 7)])
+def test_a_log_that_holds_nothing_leaves_no_file(tmp_path: Path, content: str | None, code: int) -> None:
+    log = tmp_path / "bus.log"
+    if content is not None:
+        log.write_text(content)
+    assert exported(log) == code
+    assert not log.with_suffix(".mcap").exists()
