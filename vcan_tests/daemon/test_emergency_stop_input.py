@@ -10,6 +10,7 @@ import msgspec
 import pytest
 
 from canhelm.errors import EmergencyStop, NodeAbsent
+from drivers.epos.emergency_stop_input import STALE_S
 from drivers.epos.objects import OBJECTS
 from profiles.loader import load
 from profiles.schema import EmergencyStopConfig, Profile
@@ -75,7 +76,8 @@ async def test_a_robot_that_boots_with_it_pressed_is_stopped_and_says_so() -> No
 async def test_an_input_that_is_not_told_any_more_counts_as_pressed() -> None:
     async with robot_with_button() as robot:
         await robot.app.supervisor.master.sdo(3).write(OBJECTS["tpdo2_cob_id"], 0x80000283)
-        await robot.until(lambda: robot.state == "estop")
+        seen_s = await robot.until(lambda: robot.state == "estop")
+        assert seen_s <= STALE_S + CYCLES * robot.app.cycle.period_s
         assert "is not told any more" in robot.app.service.status()["message"]
 
 

@@ -163,10 +163,33 @@ def test_a_port_alone_is_one_of_the_loopback_interface(address: str, host: str, 
     assert (access.host, access.port) == (host, 4310)
 
 
-def test_nothing_listens_on_a_network_unless_it_is_told_to(tmp_path: Path) -> None:
-    app = App(load("max2d").profile, socket=tmp_path / "x.sock", gateway=GatewayAccess(tmp_path / "x.309.sock"))
-    assert app.gateway is not None
-    assert (app.door, app.gateway.tcp_port) == (None, None)
+def _network_listeners() -> list[str]:
+    """Addresses at which this process takes something from a network."""
+    found = []
+    for descriptor in os.listdir("/proc/self/fd"):
+        try:
+            each = socket.socket(fileno=int(descriptor))
+        except OSError:
+            continue  # it is no socket
+        if each.family in (socket.AF_INET, socket.AF_INET6):
+            found.append(each.getsockname()[0])
+        each.detach()
+    return found
+
+
+@pytest.mark.real_time
+@pytest.mark.parametrize(("port", "addresses"), [(None, []), (0, ["127.0.0.1"])])
+async def test_nothing_listens_on_a_network_unless_it_is_told_to(
+    tmp_path: Path, port: int | None, addresses: list[str]
+) -> None:
+    gateway = GatewayAccess(tmp_path / "x.309.sock", tcp_port=port)
+    app = App(load("max2d").profile, socket=tmp_path / "x.sock", gateway=gateway, powered=False)
+    before = _network_listeners()
+    await app.start()
+    try:
+        assert sorted(_network_listeners()) == sorted(before + addresses)
+    finally:
+        await app.close()
 
 
 def test_an_empty_record_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
