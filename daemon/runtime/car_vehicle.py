@@ -171,14 +171,18 @@ class CarVehicle(SteeredVehicle):
         if isinstance(motion, CarMotion | PathMotion):
             self.encoders[0].require_ready()
 
+    @property
+    def place(self) -> Pose:
+        """Where it is by its odometry."""
+        return self.odometry.pose
+
     def status(self) -> dict[str, Any]:
         """Steering angle and odometry of the rear axle's middle."""
-        pose = self.odometry.pose
         return {
             "type": self._geometry.type,
             "methods": list(self.methods),
             "steering_deg": round(math.degrees(self.encoders[0].heading_rad), 3),
-            "odometry": place_and_yaw(pose),
+            "odometry": place_and_yaw(self.place),
         }
 
 

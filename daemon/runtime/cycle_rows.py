@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from daemon.runtime.supervisor import Supervisor
@@ -11,7 +12,7 @@ WHEEL_COLUMNS = ("commanded_m_s", "speed_m_s", "travel_m", "current_a")
 
 
 class CycleRows:
-    """Makes the rows of one robot.
+    """Makes the rows of one robot: their values in each cycle, their text when there is time for it.
 
     Currents have the sign of the wheel: positive where the motor pushes forward.
 
@@ -19,7 +20,7 @@ class CycleRows:
         supervisor: of the robot.
 
     Attributes:
-        head: the columns' names as the first line of a CSV file, with the time that the caller puts in front.
+        head: the columns' names as the first line of a CSV file, with the time in front.
     """
 
     def __init__(self, supervisor: Supervisor) -> None:
@@ -35,19 +36,25 @@ class CycleRows:
         names += [f"{brake.name}.brake" for brake in vehicle.brakes]
         self.head = (",".join([*names, "limits"]) + "\n").encode()
         wheels = ["%.4f,%.4f,%.4f,%.3f"] * len(self._drives)
-        self._format = ",".join(["%s", *wheels, *["%.3f"] * len(vehicle.encoders), *["%s"] * len(vehicle.brakes), "%s"])
+        headings, brakes = ["%.3f"] * len(vehicle.encoders), ["%s"] * len(vehicle.brakes)
+        self._format = ",".join(["%.4f", "%s", "%s", "%s", *wheels, *headings, *brakes, "%s\n"])
 
-    def row(self) -> str:
-        """This cycle's row, without time and line end."""
-        vehicle = self._vehicle
-        values: list[Any] = [self._pose()]
+    def values(self) -> list[Any]:
+        """This cycle's row, without its time."""
+        place = self._vehicle.place
+        values: list[Any] = ["", "", ""] if place is None else [place.x_m, place.y_m, math.degrees(place.yaw_rad)]
         for drive, sign in self._wheels:
             values += (drive.target_speed_m_s, drive.speed_m_s, drive.position_m, sign * drive.current_a)
-        values += [math.degrees(encoder.heading_rad) for encoder in vehicle.encoders]
-        values += [str(brake.state) for brake in vehicle.brakes]
+        values += [math.degrees(encoder.heading_rad) for encoder in self._vehicle.encoders]
+        values += [brake.state for brake in self._vehicle.brakes]
         values.append(" ".join(self._supervisor.active_limits))
-        return self._format % tuple(values)
+        return values
 
-    def _pose(self) -> str:
-        odometry = self._vehicle.status().get("odometry")
-        return "{x_m},{y_m},{yaw_deg}".format(**odometry) if odometry else ",,"
+    def text(self, time_s: float, values: Sequence[Any]) -> bytes:
+        """The line of the CSV file for a row's values."""
+        place = values[:3] if values[0] == "" else map(_rounded, values[:3], (4, 4, 3))
+        return (self._format % (time_s, *place, *values[3:])).encode()
+
+
+def _rounded(value: float, digits: int) -> float:
+    return round(value, digits) + 0.0  # not -0.0

@@ -179,6 +179,11 @@ class DifferentialVehicle(Vehicle):
             poses.append(pose)
         return poses
 
+    @property
+    def place(self) -> Pose:
+        """Where it is by its odometry."""
+        return self.odometry.pose
+
     def status(self) -> dict[str, Any]:
         """Odometry and motion."""
         pose = self.odometry.pose

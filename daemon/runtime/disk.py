@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 
 from daemon.runtime.clock import VirtualTimeLoop
 
+PAUSE_S = 0.01
+"""Between two jobs that leave the control cycle its time."""
 PENDING_LIMIT_BYTES = 8_000_000
 """What may wait for a slow disk; more is thrown away."""
 
@@ -24,6 +27,8 @@ class Disk:
         self._loop = asyncio.get_running_loop()
         self._on_failure = on_failure
         self._pending_bytes = 0
+        self._in_turns: deque[Callable[[], None]] = deque()
+        self._timer: asyncio.TimerHandle | None = None
         virtual = isinstance(self._loop, VirtualTimeLoop)
         self._pool = None if virtual else ThreadPoolExecutor(1, "canhelm-runs")
 
@@ -48,8 +53,24 @@ class Disk:
         self._done(size_bytes, error)
         return True
 
+    def do_in_turns(self, *jobs: Callable[[], None]) -> None:
+        """Carry out jobs that compute for a while, with pauses in between: threads share one interpreter."""
+        self._in_turns.extend(jobs)
+        if self._timer is None:
+            self._take_turn()
+
+    def _take_turn(self) -> None:
+        self._timer = None
+        if self._in_turns:
+            self.do(self._in_turns.popleft())
+            self._timer = self._loop.call_later(PAUSE_S, self._take_turn)
+
     def close(self) -> None:
         """Wait until everything is done."""
+        if self._timer is not None:
+            self._timer.cancel()
+        while self._in_turns:
+            self.do(self._in_turns.popleft())
         if self._pool is not None:
             self._pool.shutdown()
 

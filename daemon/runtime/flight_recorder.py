@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import msgspec
@@ -19,33 +19,44 @@ LATCHED = (VehicleState.FAULT, VehicleState.ESTOP)
 
 
 class Slice:
-    """What one second brought, as lines of text.
+    """What one second brought, packed: lines of text are made of it when it is written.
 
     Args:
         begun_s: loop time.
 
     Attributes:
-        frames: of the bus, as candump logs them.
-        cycles: rows of a run's table.
-        records: of each cycle, everything that went into the laws and came out, as JSON.
+        frames: of the bus, as :func:`drivers.bus.candump.pack_frame` makes them.
+        records: of each cycle, the values of its row and everything that went into the laws and came out; and of each
+            motion that begins, what it was asked for. As MessagePack, for :func:`unpack_record`.
     """
 
-    __slots__ = ("begun_s", "cycles", "frames", "records")
+    __slots__ = ("_records_bytes", "begun_s", "frames", "records")
 
     def __init__(self, begun_s: float) -> None:
         self.begun_s = begun_s
-        self.frames, self.cycles, self.records = bytearray(), bytearray(), bytearray()
+        self.frames = bytearray()
+        self.records: list[bytes] = []
+        self._records_bytes = 0
+
+    def add(self, record: bytes) -> None:
+        """The next record."""
+        self.records.append(record)
+        self._records_bytes += len(record)
 
     @property
     def size_bytes(self) -> int:
-        """What it takes in memory, and later on the disk."""
-        return len(self.frames) + len(self.cycles) + len(self.records)
+        """What it takes in memory; as text it takes more."""
+        return len(self.frames) + self._records_bytes
+
+
+def unpack_record(packed: bytes) -> tuple[float, list[Any] | None, dict[str, Any]]:
+    """Time of a record, the values of its row, where it is that of a cycle, and the record itself."""
+    time_s, values, record = msgspec.msgpack.decode(packed)
+    return time_s, values, record
 
 
 class FlightRecorder:
     """Keeps the last 60 s, and hands them over when a fault or an emergency stop becomes latched.
-
-    It makes lines at once and not when they are needed: a fault is the worst moment for half a second of work.
 
     Args:
         supervisor: whose cycles they are.
@@ -62,23 +73,28 @@ class FlightRecorder:
         self._slices = deque([self._newest])
         self._cut_s = -math.inf
         self._latched = False
-        self._encode = msgspec.json.Encoder(enc_hook=str).encode
+        self._encode = msgspec.msgpack.Encoder(enc_hook=str).encode
 
-    def take_frame(self, line: bytes, time_s: float) -> None:
+    def take_frame(self, packed: bytes, time_s: float) -> None:
         """A frame of the bus, at its loop time."""
         if time_s >= self._cut_s:
             self._cut(time_s)
-        self._newest.frames += line
+        self._newest.frames += packed
 
     def take_motion(self, motion: Motion, time_s: float) -> None:
         """What a motion that begins was asked for; its cycles follow."""
         if time_s >= self._cut_s:
             self._cut(time_s)
         begins = {**_name(motion), "drives": motion.drives, "asked": motion.asked}
-        self._newest.records += self._encode({"time_s": time_s, "begins": begins}) + b"\n"
+        self._newest.add(self._encode((time_s, None, {"time_s": time_s, "begins": begins})))
 
-    def take_cycle(self, row: str) -> None:
-        """A control cycle that is over, with its row of a run's table."""
+    def take_cycle(self, row: list[Any], terms: Mapping[str, msgspec.Raw]) -> None:
+        """A control cycle that is over.
+
+        Args:
+            row: values of its row in a run's table.
+            terms: of the motions' laws, as MessagePack, by the motions' numbers.
+        """
         supervisor = self._supervisor
         measurement, state = supervisor.measurement, supervisor.state
         assert measurement is not None
@@ -91,10 +107,9 @@ class FlightRecorder:
             "measurement": measurement,
             "command": supervisor.command,
             "limits": supervisor.active_limits,
-            "motions": [_step(motion) for motion in supervisor.motions.values()],
+            "motions": [_step(motion, terms[number]) for number, motion in supervisor.motions.items()],
         }
-        self._newest.cycles += f"{now_s:.4f},{row}\n".encode()
-        self._newest.records += self._encode(record) + b"\n"
+        self._newest.add(self._encode((now_s, row, record)))
         self._look(latched=state in LATCHED, now_s=now_s)
 
     def _look(self, *, latched: bool, now_s: float) -> None:
@@ -117,6 +132,6 @@ def _name(motion: Motion) -> dict[str, Any]:
     return {"motion": motion.identity, "kind": motion.kind}
 
 
-def _step(motion: Motion) -> dict[str, Any]:
+def _step(motion: Motion, terms: msgspec.Raw) -> dict[str, Any]:
     stepped = motion.running and not motion.ended.done()
-    return {**_name(motion), "running": stepped, "stop_reason": motion.stop_reason, "terms": motion.terms}
+    return {**_name(motion), "running": stepped, "stop_reason": motion.stop_reason, "terms": terms}

@@ -10,6 +10,7 @@ from canhelm.errors import Refused, UsageError
 from daemon.loops.accelerometer import Mounting
 from daemon.loops.jerk_limit import JerkLimitedGuide
 from daemon.loops.measurement import Measurement
+from daemon.loops.odometry import Pose
 from daemon.loops.omni_drive import OmniLaw
 from daemon.loops.omni_guide import GoalGuide, Guide, PublishedGuide, Signals, Twist, TwistGuide
 from daemon.loops.omni_senses import OmniSenses, omni_kinematics, omni_observer
@@ -201,6 +202,11 @@ class OmniVehicle(Vehicle):
         require_at_most("speed", limits.speed, self.limits.speed, "m/s", "speed_m_s")
         require_at_most("acceleration", limits.acceleration, self.limits.acceleration, "m/s^2", "acceleration_m_s2")
         require_at_most("speed at the goal", math.hypot(goal.vx, goal.vy), limits.speed, "m/s", "speed_m_s")
+
+    @property
+    def place(self) -> Pose:
+        """Where it is by its odometry."""
+        return self.senses.pose
 
     def status(self) -> dict[str, Any]:
         """Odometry, motion and acceleration of the centre."""

@@ -128,6 +128,11 @@ class OwnKindVehicle(Vehicle):
             LOGGER.exception("%s failed", self._geometry.kind)
             self.failure = f"the odometry of {self._geometry.kind} failed: {error}"
 
+    @property
+    def place(self) -> Pose:
+        """Where it is by its odometry."""
+        return self.pose
+
     def status(self) -> dict[str, Any]:
         """Its kind, odometry and motion."""
         forward, left, rate = self.motion_now

@@ -10,7 +10,7 @@ from canhelm.errors import Interlock, Refused, UsageError
 from daemon.loops.geometry import PAIR_NAMES
 from daemon.loops.locked_drive import LockedDrive
 from daemon.loops.measurement import Measurement
-from daemon.loops.odometry import Odometry
+from daemon.loops.odometry import Odometry, Pose
 from daemon.loops.paired_steer import PairedSteerLaw
 from daemon.loops.paired_steer_target import (
     SINGLE_CENTRE_LIMIT_RAD,
@@ -161,6 +161,11 @@ class PairedSteerVehicle(Vehicle):
                 f"the {' and '.join(loose)} steering brake is not engaged: a wheel would turn its pair",
                 remedy="`canhelm brake engage`, or `canhelm steer` to turn a pair",
             )
+
+    @property
+    def place(self) -> Pose:
+        """Where it is by its odometry."""
+        return self.odometry.pose
 
     def status(self) -> dict[str, Any]:
         """Headings and odometry."""

@@ -13,7 +13,7 @@ from daemon.runtime.clock import VirtualTimeLoop
 from daemon.runtime.disk import Disk
 from daemon.runtime.events import EventLog
 from daemon.runtime.log_files import LogFiles
-from drivers.bus.candump import make_line
+from drivers.bus.candump import PACKED_BYTES, make_lines, pack_frame
 from drivers.bus.contract import Bus
 
 WRITE_PERIOD_S = 0.1
@@ -103,7 +103,7 @@ class CandumpRecorder:
 
     def _record(self, can_id: int, data: bytes, timestamp_s: float) -> None:
         self.frames += 1
-        self._pending += f"{make_line(self._epoch_s + timestamp_s, self._bus.name, can_id, data)}\n".encode()
+        self._pending += pack_frame(timestamp_s, can_id, data)
         if self._timer is None:
             period_s = RETRY_PERIOD_S if self._failing else WRITE_PERIOD_S
             self._timer = self._loop.call_later(period_s, self._write)
@@ -113,12 +113,16 @@ class CandumpRecorder:
             self._timer.cancel()
             self._timer = None
         assert self._disk is not None
-        lines, self._pending = bytes(self._pending), bytearray()
-        if not self._disk.do(partial(self._files.write, lines, self._loop.time()), len(lines)):
-            self._lost += lines.count(b"\n")
+        packed, self._pending = self._pending, bytearray()
+        if not self._disk.do(partial(self._write_lines, packed, self._loop.time()), len(packed)):
+            self._lost += len(packed) // PACKED_BYTES
         if self._failing and not self._files.failing:
             self._failing = False
             self._events.add("info", "recording", f"goes on in {self.path}; {self.lost} frames are missing in all")
+
+    def _write_lines(self, packed: bytearray, now_s: float) -> None:
+        """In the disk's thread."""
+        self._files.write(make_lines(packed, self._epoch_s, self._bus.name), now_s)
 
     def _on_failure(self, error: OSError) -> None:
         self.errors += 1

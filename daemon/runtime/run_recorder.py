@@ -7,7 +7,7 @@ import errno
 import logging
 import platform
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -23,20 +23,19 @@ from daemon.runs.store import (
     EVENTS,
     FACTS,
     FAULT,
-    FRAMES,
     PROFILE,
-    RECORDS,
-    TERMS,
     RunStore,
     make_yaml,
 )
 from daemon.runtime.clock import VirtualTimeLoop
 from daemon.runtime.cycle_rows import CycleRows
 from daemon.runtime.disk import Disk
+from daemon.runtime.fault_text import FaultText
 from daemon.runtime.flight_recorder import KEPT_S, FlightRecorder, Slice
 from daemon.runtime.motions import Motion
+from daemon.runtime.recording import Pending, Recording, Step
 from daemon.runtime.supervisor import Supervisor
-from drivers.bus.candump import make_line
+from drivers.bus.candump import make_lines, pack_frame
 from drivers.bus.contract import Bus
 from drivers.epos.drive import EposDrive
 from profiles.schema import Profile
@@ -45,37 +44,6 @@ LOGGER = logging.getLogger("canhelm.runs")
 FLUSH_PERIOD_S = 1.0
 ROOM = "make room there, or: canhelm runs delete NUMBER"
 ELSEWHERE = "keep them in a folder that can be written: canhelm run --runs DIR"
-
-
-class Recording:
-    """One run under way.
-
-    Args:
-        motion: what leaves it.
-        part: counts the runs of one long motion.
-        now_s: loop time.
-
-    Attributes:
-        folder: where its files are; None until the disk has made it, or where it cannot.
-        failed: the disk failed: nothing more is recorded of it.
-    """
-
-    def __init__(self, motion: Motion, part: int, now_s: float) -> None:
-        self.motion = motion
-        self.part = part
-        self.begun_s = self.flushed_s = now_s
-        self.folder: Path | None = None
-        self.failed = False
-        self.facts: dict[str, Any] = {}
-        self.cycles, self.terms, self.frames = bytearray(), bytearray(), bytearray()
-        self.rows = self.size_bytes = self.lost_bytes = 0
-
-    def take_pending(self) -> dict[str, bytes]:
-        """What was gathered since the last time, by file; nothing of it stays."""
-        pending = {CYCLES: bytes(self.cycles), TERMS: bytes(self.terms), FRAMES: bytes(self.frames)}
-        for gathered in (self.cycles, self.terms, self.frames):
-            gathered.clear()
-        return pending
 
 
 class RunRecorder:
@@ -114,6 +82,7 @@ class RunRecorder:
         self._epoch_s = 0.0 if virtual else time.time() - self._loop.time()
         self._disk = Disk(self._on_failure)
         self._rows = CycleRows(self._supervisor)
+        self._pack = msgspec.msgpack.Encoder(enc_hook=str).encode
         self._profile_yaml = make_yaml(self._profile)
         self._flight = FlightRecorder(self._supervisor, self._store.run_bytes, self._keep_fault)
         self._supervisor.on_motion.append(self._on_motion)
@@ -151,9 +120,11 @@ class RunRecorder:
             return
         try:
             self._end_closed()
-            row = self._rows.row()
-            self._gather(row)
-            self._flight.take_cycle(row)
+            values = self._rows.values()
+            motions = self._supervisor.motions.items()
+            terms = {number: msgspec.Raw(self._pack(motion.terms)) for number, motion in motions}
+            self._gather(values, terms)
+            self._flight.take_cycle(values, terms)
         except Exception:
             LOGGER.exception("the recording of runs failed")
             self._give_up()
@@ -171,7 +142,6 @@ class RunRecorder:
         self.message, self.remedy, self._given_up = "", "", False
         recording = Recording(motion, part, self._loop.time())
         recording.facts = self._facts(recording)
-        recording.cycles += self._rows.head
         self._recordings.append(recording)
         drives = self._confirmed()
         self._disk.do(partial(self._make_folder, recording, dict(recording.facts), drives))
@@ -182,6 +152,7 @@ class RunRecorder:
         (folder / PROFILE).write_bytes(self._profile_yaml)
         (folder / DRIVES).write_bytes(make_yaml(drives))
         (folder / FACTS).write_bytes(make_yaml(facts))
+        (folder / CYCLES).write_bytes(self._rows.head)
         recording.folder = self._last = folder
 
     def _facts(self, recording: Recording) -> dict[str, Any]:
@@ -234,11 +205,11 @@ class RunRecorder:
 
     # --- gathering ---------------------------------------------------------------------------------------------
 
-    def _gather(self, row: str) -> None:
+    def _gather(self, values: list[Any], terms: Mapping[str, msgspec.Raw]) -> None:
         now_s = self._loop.time()
         for recording in list(self._recordings):
             if not recording.failed:
-                self._take(recording, row, now_s)
+                self._take(recording, values, terms[recording.motion.identity], now_s)
             if recording.size_bytes > self._store.run_bytes:
                 self._end(recording, "continued", "goes on in the next run")
                 self._begin(recording.motion, recording.part + 1)
@@ -248,51 +219,56 @@ class RunRecorder:
             if recording.motion.closed.is_set():
                 self._end(recording)
 
-    def _take(self, recording: Recording, row: str, now_s: float) -> None:
-        time_s = now_s - recording.begun_s
+    def _take(self, recording: Recording, values: list[Any], terms: msgspec.Raw, now_s: float) -> None:
         recording.rows += 1
-        recording.cycles += f"{time_s:.4f},{row}\n".encode()
-        step = {"time_s": round(time_s, 4), "terms": recording.motion.terms}
-        recording.terms += msgspec.json.encode(step, enc_hook=str) + b"\n"
+        recording.steps.append(Step(now_s - recording.begun_s, values, terms))
         if now_s - recording.flushed_s >= FLUSH_PERIOD_S:
             recording.flushed_s = now_s
             self._flush(recording)
 
     def _on_frame(self, can_id: int, data: bytes, timestamp_s: float) -> None:
-        line = f"{make_line(self._epoch_s + timestamp_s, self._bus.name, can_id, data)}\n".encode()
+        packed = pack_frame(timestamp_s, can_id, data)
         for recording in self._recordings:
-            recording.frames += line
-        self._flight.take_frame(line, timestamp_s)
+            recording.frames += packed
+        self._flight.take_frame(packed, timestamp_s)
 
     # --- faults ------------------------------------------------------------------------------------------------
 
     def _keep_fault(self, slices: Sequence[Slice]) -> None:
         supervisor, now_s = self._supervisor, self._loop.time()
         facts = {
-            **self._place(slices[0].begun_s),
             "kind": FAULT,
             "motion": ", ".join(motion.kind for motion in supervisor.motions.values()) or None,
             "clock_unix_s": round(self._epoch_s, 6),
-            "duration_s": round(now_s - slices[0].begun_s, 3),
             "ended": str(supervisor.state),
             "message": supervisor.message,
         }
         events = [event for event in supervisor.log.events if event["time_s"] >= now_s - KEPT_S]
-        self._disk.do(partial(self._write_fault, slices, facts, self._confirmed(), events))
+        text = FaultText(self._rows, self._make_frames, self._store.run_bytes)
+        self._disk.do_in_turns(
+            *(partial(text.take, kept) for kept in reversed(slices)),
+            partial(self._write_fault, text, now_s, facts, self._confirmed(), events),
+        )
+
+    def _make_frames(self, packed: bytearray) -> bytes:
+        return make_lines(packed, self._epoch_s, self._bus.name)
 
     def _write_fault(
-        self, slices: Sequence[Slice], facts: dict[str, Any], drives: dict[str, Any], events: list[dict[str, Any]]
+        self,
+        text: FaultText,
+        now_s: float,
+        facts: dict[str, Any],
+        drives: dict[str, Any],
+        events: list[dict[str, Any]],
     ) -> None:
         """In the disk's thread."""
-        rows = sum(kept.cycles.count(b"\n") for kept in slices)
-        files: dict[str, list[bytes | bytearray]] = {
-            FACTS: [make_yaml({**facts, "rows": rows})],
+        facts = {**self._place(text.begun_s), **facts, "duration_s": round(now_s - text.begun_s, 3), "rows": text.rows}
+        files: dict[str, list[bytes]] = {
+            FACTS: [make_yaml(facts)],
             PROFILE: [self._profile_yaml],
             DRIVES: [make_yaml(drives)],
             EVENTS: [msgspec.json.encode(event) + b"\n" for event in events],
-            CYCLES: [self._rows.head, *(kept.cycles for kept in slices)],
-            RECORDS: [kept.records for kept in slices],
-            FRAMES: [kept.frames for kept in slices],
+            **text.files(),
         }
         self._last = folder = self._store.keep(files)
         told = f"the last {facts['duration_s']:.1f} s before it are run {int(folder.name)}"
@@ -304,23 +280,14 @@ class RunRecorder:
 
     def _flush(self, recording: Recording) -> None:
         pending = recording.take_pending()
-        size = sum(map(len, pending.values()))
         if recording.failed:
             return
-        if self._disk.do(partial(self._append, recording, pending), size):
-            recording.size_bytes += size
-        else:
-            recording.lost_bytes += size
+        if not self._disk.do(partial(self._append, recording, pending), pending.size_bytes):
+            recording.lost_bytes += pending.size_bytes
 
-    def _append(self, recording: Recording, pending: dict[str, bytes]) -> None:
+    def _append(self, recording: Recording, pending: Pending) -> None:
         """In the disk's thread."""
-        if recording.folder is None:
-            return
-        for name, data in pending.items():
-            if not data:
-                continue
-            with (recording.folder / name).open("ab") as file:
-                file.write(data)
+        recording.append(pending.files(self._rows, self._make_frames))
 
     def _on_failure(self, error: OSError) -> None:
         told = f"runs cannot be written to {self._store.folder}: {error.strerror or error}"

@@ -163,6 +163,11 @@ class SemitrailerVehicle(SteeredVehicle):
             for encoder in self.encoders:
                 encoder.require_ready()
 
+    @property
+    def place(self) -> Pose:
+        """Where it is by its odometry."""
+        return self.reading.truck
+
     def status(self) -> dict[str, Any]:
         """Angles, jackknife margin and odometry of truck and trailer."""
         reading = self.reading

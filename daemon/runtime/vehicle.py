@@ -10,6 +10,7 @@ from typing import Any, Final
 from canhelm.errors import LimitExceeded
 from daemon.loops.limits import Gate
 from daemon.loops.measurement import Command, Measurement
+from daemon.loops.odometry import Pose
 from daemon.runtime.motions import Motion
 from daemon.runtime.streams import valid_for_s
 from drivers.contract import Brake, BrakeState, Drive, SteeringEncoder
@@ -137,6 +138,11 @@ class Vehicle(ABC):
         limits = self.profile.limits
         turning_s = limits.yaw_rate_deg_s / limits.yaw_acceleration_deg_s2 if "yaw_rate" in self.sticks() else 0.0
         return max(limits.speed_m_s / limits.acceleration_m_s2, turning_s)
+
+    @property
+    def place(self) -> Pose | None:
+        """Where it is by its odometry; None where it has none."""
+        return None
 
     def observe(self, measurement: Measurement) -> None:
         """Told of every cycle's measurement (odometry)."""

@@ -6,6 +6,7 @@ It is what ``candump -L`` writes and what ``canplayer`` and python-can read (can
 from __future__ import annotations
 
 import re
+import struct
 from typing import NamedTuple
 
 from drivers.bus.contract import ID_MASK, RTR_FLAG
@@ -13,6 +14,12 @@ from drivers.bus.contract import ID_MASK, RTR_FLAG
 _LINE = re.compile(
     r"\((\d+\.\d+)\) (\S+) ([0-7][0-9A-Fa-f]{2})#(?:[Rr][0-8]?|((?:[0-9A-Fa-f]{2}){0,8}))(?: [RT])?\s*", re.ASCII
 )
+
+
+_PACKED = struct.Struct("=dIB8s")
+PACKED_BYTES = _PACKED.size
+"""Of one packed frame."""
+_pack = _PACKED.pack
 
 
 class LogFrame(NamedTuple):
@@ -33,8 +40,30 @@ class LogFrame(NamedTuple):
 
 def make_line(timestamp_s: float, interface: str, can_id: int, data: bytes) -> str:
     """One line without its line end; the time in full microseconds."""
-    payload = "R" if can_id & RTR_FLAG else data.hex().upper()
-    return f"({timestamp_s:017.6f}) {interface} {can_id & ID_MASK:03X}#{payload}"
+    return make_lines(pack_frame(timestamp_s, can_id, data), 0.0, interface)[:-1].decode()
+
+
+def pack_frame(timestamp_s: float, can_id: int, data: bytes) -> bytes:
+    """A frame as it is gathered where there is no time for a line: :func:`make_lines` makes lines of many."""
+    return _pack(timestamp_s, can_id, len(data), data)
+
+
+def make_lines(packed: bytes | bytearray, epoch_s: float, interface: str) -> bytes:
+    """The lines of packed frames one after the other, each with its line end.
+
+    Args:
+        packed: of :func:`pack_frame`.
+        epoch_s: added to each time stamp.
+        interface: name of the interface.
+    """
+    heads: dict[int, str] = {}
+    lines: list[str] = []
+    for timestamp_s, can_id, length, data in _PACKED.iter_unpack(packed):
+        head = heads.get(can_id)
+        if head is None:
+            head = heads[can_id] = f"{interface} {can_id & ID_MASK:03X}#{'R' if can_id & RTR_FLAG else ''}"
+        lines.append(f"({epoch_s + timestamp_s:017.6f}) {head}{data[:length].hex().upper()}\n")
+    return "".join(lines).encode()
 
 
 def parse_line(line: str) -> LogFrame | None:

@@ -174,10 +174,10 @@ async def test_a_folder_that_cannot_be_written_is_told_with_the_option_for_anoth
 async def test_a_defect_of_the_recording_does_not_stop_the_robot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def defect(rows: CycleRows) -> str:
+    def defect(rows: CycleRows) -> list[object]:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(CycleRows, "row", defect)
+    monkeypatch.setattr(CycleRows, "values", defect)
     async with running_robot(runs=RunStore(tmp_path), expect_errors=True) as robot:
         result = await robot.call("drive.parallel", **STRAIGHT)
         told = robot.app.service.status()["runs"]["message"]
