@@ -38,7 +38,7 @@ fuzz: $(VENV)/.stamp-test ## any input to every reader and every wire: MINUTES=1
 long-life: $(VENV)/.stamp-test ## 12 virtual hours among people, programs and faults, in about one; figures into long-life-out/
 	$(VENV)/bin/python -m vcan_tests.long_life $(ARGS)
 
-bench: $(VENV)/.stamp-test ## what canhelm costs and how fast it is here, into bench-out/; ARGS='--vcan' or ARGS='PART ...'
+bench: $(VENV)/.stamp-bench ## what canhelm costs and how fast it is here, into bench-out/; ARGS='--vcan' or ARGS='PART ...'
 	$(VENV)/bin/python -m benchmarks $(ARGS)
 
 vcan-test: $(VENV)/.stamp-test ## the tests on a kernel's CAN bus and under a real systemd, both booted if need be
@@ -85,6 +85,11 @@ $(VENV)/.stamp-demo: pyproject.toml | $(VENV)/bin/pip
 $(VENV)/.stamp-test: pyproject.toml | $(VENV)/bin/pip
 	@echo "installing canhelm and what its tests need into $(VENV)"
 	@$(PIP) --editable '.[plot,test]'
+	@touch $@
+
+$(VENV)/.stamp-bench: pyproject.toml | $(VENV)/bin/pip
+	@echo "installing canhelm and what its benchmark needs into $(VENV)"
+	@$(PIP) --editable '.[bench]'
 	@touch $@
 
 $(VENV)/.stamp-docs: pyproject.toml | $(VENV)/bin/pip

@@ -25,7 +25,19 @@ from canhelm import __version__
 from daemon.cli.output import console, words
 from vcan_tests.arguments import positive
 
-PARTS = ("latency", "jitter", "process", "command_line", "simulation", "nodes", "rates", "serial", "campaigns")
+PARTS = (
+    "cycle",
+    "sdo",
+    "latency",
+    "jitter",
+    "process",
+    "command_line",
+    "simulation",
+    "nodes",
+    "rates",
+    "serial",
+    "campaigns",
+)
 """In the order in which they run."""
 BOOTED = ("vcan",)
 """Runs when it is asked for: needs a kernel's CAN."""

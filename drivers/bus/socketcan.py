@@ -59,9 +59,13 @@ OLDEST_STAMP_S = 60.0
 
 _CAN_RAW_ERR_FILTER = 2
 _SO_RCVBUFFORCE = 33
-_MSG_CONFIRM = 0x800
-"""Flag of a received frame: this very socket sent it. MSG_DONTROUTE: this machine did."""
+_OURS, _OWN = int(socket.MSG_DONTROUTE), 0x800
+"""Flags of a received frame: this machine sent it; this very socket did (MSG_CONFIRM)."""
 _NO_ROOM = {errno.ENOBUFS, errno.EAGAIN}
+
+
+def _make_raw_socket() -> socket.socket:
+    return socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
 
 
 class _Taps(list[FrameHandler]):
@@ -86,15 +90,19 @@ class SocketCanBus(Bus):
     Args:
         channel: name of the interface.
         bit_rate: bit/s that it is expected to have; who sets the interface up decides.
+        make_socket: makes the socket, not bound yet; raises OSError.
 
     Attributes:
         foreign: frames that are no classic base frames.
         overflowed: frames that the kernel dropped because its receive buffer was full.
     """
 
-    def __init__(self, channel: str, bit_rate: int) -> None:
+    def __init__(
+        self, channel: str, bit_rate: int, make_socket: Callable[[], socket.socket] = _make_raw_socket
+    ) -> None:
         super().__init__(channel, bit_rate)
         self.taps = _Taps(self._set_filters)
+        self._make_socket = make_socket
         self.foreign = 0
         self.overflowed = 0
         self._controller = Controller(channel, f"then sudo ip link set {channel} down; sudo ip link set {channel} up")
@@ -202,10 +210,10 @@ class SocketCanBus(Bus):
             return
         for tap in tuple(self.taps):
             tap(can_id, data, stamp)
-        if flags & socket.MSG_DONTROUTE and can_id in self._heard:
-            self.counters.sent += not flags & _MSG_CONFIRM
+        if flags & _OURS and can_id in self._heard:
+            self.counters.sent += not flags & _OWN
             self._heard[can_id](can_id, data, stamp)
-        elif not flags & _MSG_CONFIRM:
+        elif not flags & _OWN:
             if self.down is not None:
                 self._recover()
             self.counters.received += 1
@@ -281,7 +289,7 @@ class SocketCanBus(Bus):
             raise BusOff(f"socketcan interface {self.name}: {self.down}", remedy=self.remedy())
 
     def _make_link(self) -> socket.socket:
-        link = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+        link = self._make_socket()
         link.setblocking(False)
         try:
             link.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, RECEIVE_BUFFER_BYTES)

@@ -1,0 +1,27 @@
+"""An expedited SDO upload beside its peers: request, answer, value; client and server in this one process."""
+
+from __future__ import annotations
+
+from benchmarks.bars import draw_bars
+from benchmarks.interleaving import Row, measure
+from benchmarks.sdo_canhelm import SdoCanhelm
+from benchmarks.sdo_floors import SdoAsyncioFloor, SdoFloor
+from benchmarks.sdo_peers import SdoCanopenAsyncio, SdoPythonCanopen
+from benchmarks.section import Options, Section, Table
+
+UPLOADS = 300
+"""Of one row before the next one has its turn."""
+TITLE = "An expedited SDO upload: client and server; CPU of the whole process"
+
+
+def run(options: Options) -> Section:
+    """Measure all rows in turn."""
+    rows: list[Row] = [SdoFloor(), SdoAsyncioFloor(), SdoCanhelm(), SdoPythonCanopen(), SdoCanopenAsyncio()]
+    found = measure(rows, UPLOADS, options.seconds, options.tell)
+    ratio = found.ratio("canhelm", "asyncio_floor")
+    tables = (
+        found.table(TITLE, "floor", "asyncio_floor"),
+        Table("canhelm", ("", "ratio of CPU", "at most"), (("to the asyncio floor", ratio, 1.3),)),
+    )
+    picture = draw_bars(found, "CPU of one SDO upload [us]", options.out / "sdo.png")
+    return Section("sdo", tables, {"rows": found.figures(), "ratios": {"canhelm_to_asyncio_floor": ratio}}, (picture,))
