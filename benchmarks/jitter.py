@@ -16,8 +16,8 @@ PERIOD_S = 0.01
 LEAST_US = 0.1
 """Shown for less, so that a logarithmic scale can."""
 
-Producer = Callable[[float, Callable[[], None]], Coroutine[Any, Any, None]]
-"""Ticks for so many seconds."""
+Producer = Callable[[int, Callable[[], None]], Coroutine[Any, Any, None]]
+"""Ticks so many times."""
 
 
 def run(options: Options) -> Section:
@@ -25,10 +25,15 @@ def run(options: Options) -> Section:
     errors_us: dict[str, list[float]] = {}
     for words, produce in PRODUCERS.items():
         options.tell(words)
-        errors_us[words] = period_errors_us(asyncio.run(_times_s(produce, options.seconds)))
+        errors_us[words] = period_errors_us(asyncio.run(_times_s(produce, ticks_in(options.seconds))))
     picture = draw_histograms(errors_us, "Jitter of SYNC", "|period - 10 ms|", options.out / "jitter.png")
     figures = {words: spread(errors).figures("us") for words, errors in errors_us.items()}
     return Section("jitter", [jitter_table("an idle loop", errors_us)], figures, [picture])
+
+
+def ticks_in(seconds: float) -> int:
+    """Ticks in a time; two of them make a period."""
+    return max(2, round(seconds / PERIOD_S))
 
 
 def jitter_table(where: str, errors_us: Mapping[str, Sequence[float]]) -> Table:
@@ -42,28 +47,37 @@ def period_errors_us(times_s: Sequence[float]) -> list[float]:
     return [max(LEAST_US, 1e6 * abs(end_s - begin_s - PERIOD_S)) for begin_s, end_s in pairwise(times_s)]
 
 
-async def _times_s(produce: Producer, seconds: float) -> list[float]:
+async def _times_s(produce: Producer, ticks: int) -> list[float]:
     loop, times_s = asyncio.get_running_loop(), list[float]()
-    await produce(seconds, lambda: times_s.append(loop.time()))
+    await produce(ticks, lambda: times_s.append(loop.time()))
     return times_s
 
 
-async def by_timerfd(seconds: float, tick: Callable[[], None]) -> None:
+async def by_timerfd(ticks: int, tick: Callable[[], None]) -> None:
     """Tick by the control cycle's own ticker."""
-    ticker = Ticker(PERIOD_S, tick)
+    ended, left = asyncio.Event(), ticks
+
+    def on_tick() -> None:
+        nonlocal left
+        tick()
+        left -= 1
+        if not left:
+            ticker.stop()
+            ended.set()
+
+    ticker = Ticker(PERIOD_S, on_tick)
     ticker.start()
-    await asyncio.sleep(seconds)
-    ticker.stop()
+    await ended.wait()
 
 
-async def by_call_at(seconds: float, tick: Callable[[], None]) -> None:
+async def by_call_at(ticks: int, tick: Callable[[], None]) -> None:
     """Tick by ``loop.call_at`` at absolute deadlines."""
-    loop = asyncio.get_running_loop()
-    begin_s, ended = loop.time(), asyncio.Event()
+    loop, ended = asyncio.get_running_loop(), asyncio.Event()
+    begin_s = loop.time()
 
     def on_timer(number: int) -> None:
         tick()
-        if number * PERIOD_S >= seconds:
+        if number == ticks:
             ended.set()
         else:
             loop.call_at(begin_s + (number + 1) * PERIOD_S, on_timer, number + 1)

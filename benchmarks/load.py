@@ -13,7 +13,7 @@ from daemon.runtime.clock import run_virtual
 from drivers.bus.wire_time import frame_bits
 from profiles.schema import Profile
 
-TIMES = 5
+TIMES, LEAST_CYCLES = 5, 2
 FIRST_SERVICE_ID = 0x580
 """Identifiers from here on are not of the control cycle: SDO, guarding."""
 
@@ -73,12 +73,13 @@ async def _watch(robot: DemoRobot, share: DaemonShare, seconds: float) -> Load:
     assert medium is not None
     app.bus.taps.append(counted.see)
     before, busy_s = _counts(robot), medium.busy_s
+    span_s = max(seconds / TIMES, LEAST_CYCLES * app.cycle.period_s)
     for _ in range(TIMES):
         begun, spent_s = app.cycle.counters.cycles, share.spent_s
-        await asyncio.sleep(seconds / TIMES)
+        await asyncio.sleep(span_s)
         spans_us.append(1e6 * (share.spent_s - spent_s) / (app.cycle.counters.cycles - begun))
     cycles, late, incomplete, lost = (now - then for now, then in zip(_counts(robot), before, strict=True))
-    wire_share = (medium.busy_s - busy_s) / seconds
+    wire_share = (medium.busy_s - busy_s) / (TIMES * span_s)
     return Load(cycles, late, incomplete, lost, counted.bits / cycles, wire_share, median(spans_us))
 
 

@@ -16,7 +16,7 @@ from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from benchmarks.jitter import PERIOD_S, PRODUCERS, Producer, period_errors_us
+from benchmarks.jitter import PERIOD_S, PRODUCERS, Producer, period_errors_us, ticks_in
 from benchmarks.latency import latencies_s
 from benchmarks.rates import kept_in_real_time
 from drivers.bus.broadcast_manager import RepeatedFrame
@@ -43,7 +43,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 def measure(folder: Path, seconds: float) -> dict[str, object]:
     """Everything, one after the other, with times in microseconds."""
     producers = {**PRODUCERS, "the kernel's broadcast manager": by_kernel}
-    jitter = {words: period_errors_us(asyncio.run(_stamps_s(produce, seconds))) for words, produce in producers.items()}
+    jitter = {
+        words: period_errors_us(asyncio.run(_stamps_s(produce, ticks_in(seconds))))
+        for words, produce in producers.items()
+    }
     with ExitStack() as stack:
         stack.callback(Simulator(write_profile(folder, patient(100)), f"socketcan:{BUS}").end)
         latencies = asyncio.run(latencies_s(f"socketcan:{BUS}", seconds))
@@ -57,19 +60,19 @@ def measure(folder: Path, seconds: float) -> dict[str, object]:
     }
 
 
-async def by_kernel(seconds: float, _: Callable[[], None]) -> None:
+async def by_kernel(ticks: int, _: Callable[[], None]) -> None:
     """Tick by the kernel, which sends the frame itself."""
-    frame = RepeatedFrame(BUS, SYNC_COB_ID, b"", PERIOD_S, round(seconds / PERIOD_S))
+    frame = RepeatedFrame(BUS, SYNC_COB_ID, b"", PERIOD_S, ticks)
     frame.start()
-    await asyncio.sleep(seconds)
+    await asyncio.sleep(ticks * PERIOD_S)
     frame.close()
 
 
-async def _stamps_s(produce: Producer, seconds: float) -> list[float]:
+async def _stamps_s(produce: Producer, ticks: int) -> list[float]:
     """Times at which SYNCs were on the bus, by the kernel's stamps."""
     async with opened(BUS) as sender, opened(BUS) as receiver:
         witness = Witness(receiver)
-        await produce(seconds, lambda: sender.send(SYNC_COB_ID))
+        await produce(ticks, lambda: sender.send(SYNC_COB_ID))
         return witness.stamps
 
 
