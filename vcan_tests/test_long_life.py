@@ -19,11 +19,19 @@ from vcan_tests.long_life.stage import Stage
 
 MAX2D = load("max2d").profile
 FIRST = Sample(
-    time_s=3.0, memory_kib=90_000, objects=100_000, tasks=7, descriptors=12, log_bytes=0, run_bytes=0, faults=0
+    time_s=3.0,
+    memory_kib=90_000,
+    objects=100_000,
+    blocks=400_000,
+    tasks=7,
+    descriptors=12,
+    log_bytes=0,
+    run_bytes=0,
+    faults=0,
 )
 
 
-def lived(hours: float, memory_kib_h: float = 0.0, objects_h: float = 0.0) -> list[Sample]:
+def lived(hours: float, memory_kib_h: float = 0.0, objects_h: float = 0.0, blocks_h: float = 0.0) -> list[Sample]:
     """A sample a minute."""
     return [
         replace(
@@ -31,6 +39,7 @@ def lived(hours: float, memory_kib_h: float = 0.0, objects_h: float = 0.0) -> li
             time_s=FIRST.time_s + 60.0 * minute,
             memory_kib=FIRST.memory_kib + round(memory_kib_h * minute / 60.0) + 100 * (minute % 7),
             objects=FIRST.objects + round(objects_h * minute / 60.0) + 20 * (minute % 5),
+            blocks=FIRST.blocks + round(blocks_h * minute / 60.0) + 50 * (minute % 3),
         )
         for minute in range(round(60.0 * hours) + 1)
     ]
@@ -44,9 +53,12 @@ def test_a_flat_life_is_not_complained_of() -> None:
     assert judged(lived(12.0)) == []
 
 
-@pytest.mark.parametrize(("memory_kib_h", "objects_h", "told"), [(400.0, 0.0, "memory_kib"), (0.0, 800.0, "objects")])
-def test_memory_that_grows_is_complained_of(memory_kib_h: float, objects_h: float, told: str) -> None:
-    (complaint,) = judged(lived(3.0, memory_kib_h, objects_h))
+@pytest.mark.parametrize(
+    ("growth_h", "told"),
+    [((400.0, 0.0, 0.0), "memory_kib"), ((0.0, 800.0, 0.0), "objects"), ((0.0, 0.0, 3000.0), "blocks")],
+)
+def test_memory_that_grows_is_complained_of(growth_h: tuple[float, float, float], told: str) -> None:
+    (complaint,) = judged(lived(3.0, *growth_h))
     assert complaint.startswith(f"{told} grows by")
 
 

@@ -20,7 +20,7 @@ from rich.table import Table
 
 from profiles.loader import load
 from vcan_tests.arguments import positive
-from vcan_tests.long_life.figures import draw, growth_per_h, table
+from vcan_tests.long_life.figures import GROWTH_H, draw, growth_per_h, table
 from vcan_tests.long_life.life import Life, live
 
 
@@ -97,7 +97,7 @@ def _show(life: Life, took_s: float) -> None:
     for row in rows:
         shown.add_row(*map(str, row.values()))
     console.print(shown)
-    for name in ("memory_kib", "objects"):
+    for name in GROWTH_H:
         growth = growth_per_h(life.samples, name)
         console.print(f"{name}: " + ("too short a life to tell" if growth is None else f"{growth:+.1f} an hour"))
     hours = life.samples[-1].time_s / 3600.0
