@@ -9,7 +9,7 @@ from benchmarks.section import Options, Section, Table
 from daemon.campaigns.cases import bounds_cases
 from daemon.campaigns.workers import drive_all
 
-RUNS_A_SECOND = 200
+RUNS_A_SECOND = 40
 """So many runs for each second that a measurement shall last."""
 SEED = 2009
 

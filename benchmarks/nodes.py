@@ -22,6 +22,11 @@ CYCLE_HZ = 20.0
 """What the wire carries with 127 drives."""
 BIT_RATE = 1_000_000
 SETTLE_S = 1.0
+PASSES = 3
+"""One after the other, so that a machine that is slow for a while is so for all of them; the best one counts."""
+GUARD_TIME_MS, SDO_TIMEOUT_S, BOOT_STEP_S = 5000, 2.0, 20.0
+"""While so many nodes are configured at once, SDO goes before guard requests on the wire, and low node ids before high
+ones: nobody may be impatient."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +57,13 @@ def drives_only(count: int, cycle_hz: float) -> Profile:
     drive = profile.drives["rear_left"]
     return replace(
         profile,
-        network=replace(profile.network, cycle_hz=cycle_hz),
+        network=replace(
+            profile.network,
+            cycle_hz=cycle_hz,
+            guard_time_ms=GUARD_TIME_MS,
+            sdo_timeout_s=SDO_TIMEOUT_S,
+            boot_deadline_s=BOOT_STEP_S,
+        ),
         drives={f"drive_{node}": replace(drive, node=node) for node in range(1, count + 1)},
         encoders={},
         brakes={},
@@ -63,9 +74,11 @@ def drives_only(count: int, cycle_hz: float) -> Profile:
 def run(options: Options, counts: Sequence[int] = COUNTS) -> Section:
     """Drives that stand; every one of them sends its readings and gets its targets in each cycle."""
     loads: dict[int, Load] = {}
-    for count in counts:
-        options.tell(f"{count} nodes")
-        loads[count] = load_of(drives_only(count, CYCLE_HZ), STANDING, options.seconds, SETTLE_S)
+    for number in range(PASSES):
+        for count in counts:
+            options.tell(f"{count} nodes, pass {number + 1} of {PASSES}")
+            found = load_of(drives_only(count, CYCLE_HZ), STANDING, options.seconds / PASSES, SETTLE_S)
+            loads[count] = min(found, loads.get(count, found), key=lambda load: load.daemon_us)
     line = fit(list(loads), [found.daemon_us for found in loads.values()])
     rows = [(count, found.daemon_us, *_on_the_wire(count, found)) for count, found in loads.items()]
     title = (

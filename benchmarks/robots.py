@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
-from typing import Any
 
 from msgspec.structs import replace
 
 from daemon.demo_robot import DemoRobot
+from drivers.simulated.bus import SimulatedPort
 from profiles.loader import load
 from profiles.schema import Profile
 
 ROBOT = "max2d"
 FOREVER_S = 36_000.0
 SEED = 1
+FRAMES_A_DRIVE = 2
+"""In the transmit queue at a time: a target and a guard request."""
 
 
 @dataclass(frozen=True)
@@ -44,9 +46,14 @@ def robot_at(cycle_hz: float) -> Profile:
 
 
 @asynccontextmanager
-async def booted(profile: Profile, bus: str = "simulated", **options: Any) -> AsyncIterator[DemoRobot]:
-    """A robot that has booted; ``options`` are those of :class:`DemoRobot`. Raises Timeout where it does not boot."""
-    robot = DemoRobot(profile, SEED, None, lambda _: None, bus=bus, **options)
+async def booted(profile: Profile, bus: str = "simulated") -> AsyncIterator[DemoRobot]:
+    """A robot that has booted. Raises Timeout where it does not.
+
+    A simulated bus has a transmit queue in which all targets of a cycle find room.
+    """
+    robot = DemoRobot(profile, SEED, None, lambda _: None, bus=bus)
+    if isinstance(robot.app.bus, SimulatedPort):
+        robot.app.bus.depth = max(robot.app.bus.depth, FRAMES_A_DRIVE * len(profile.drives))
     await robot.app.start()
     try:
         await robot.boot("the robot")

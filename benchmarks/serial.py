@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import asyncio
 
-from benchmarks.robots import STRAIGHT, begin, booted
+from benchmarks.robots import Scene, begin, booted
 from benchmarks.section import Options, Section, Table
 from daemon.runtime.clock import run_virtual
 from profiles.loader import load
 
 BAUD_RATES = (115200, 57600, 38400, 19200)
 UNDER_WAY_S = 5.0
-MOTION = STRAIGHT
+MOTION = Scene("drives straight on, 0.3 m/s", "drive.parallel", (("angle_deg", 0.0), ("speed_m_s", 0.3)))
 
 
 def run(options: Options) -> Section:
