@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-import time
 from collections import deque
 from itertools import islice
 from typing import Any
 
-from daemon.runtime.clock import VirtualTimeLoop
 from daemon.runtime.handlers import Handler, Params
+from daemon.runtime.time_of_day import epoch_s
 from drivers.bus.candump import make_line
 from drivers.bus.contract import Bus
 
@@ -49,7 +48,7 @@ class FrameCommands:
         """Keep frames from now on, until nobody has asked for a while."""
         loop = asyncio.get_running_loop()
         if self._end is None:
-            self._epoch_s = 0.0 if isinstance(loop, VirtualTimeLoop) else time.time() - loop.time()
+            self._epoch_s = epoch_s()
             self._bus.taps.append(self._take)
         else:
             self._end.cancel()

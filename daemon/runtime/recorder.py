@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import time
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from daemon.runtime.clock import VirtualTimeLoop
 from daemon.runtime.disk import Disk
 from daemon.runtime.events import EventLog
 from daemon.runtime.log_files import LogFiles
+from daemon.runtime.time_of_day import epoch_s
 from drivers.bus.candump import PACKED_BYTES, make_lines, pack_frame
 from drivers.bus.contract import Bus
 
@@ -48,9 +48,8 @@ class CandumpRecorder:
         self.frames = 0
         self.errors = 0
         self._loop = asyncio.get_running_loop()
-        virtual = isinstance(self._loop, VirtualTimeLoop)
-        self._epoch_s = 0.0 if virtual else time.time() - self._loop.time()
-        self._files = LogFiles(path, robot, limit_bytes, sync=not virtual)
+        self._epoch_s = epoch_s()
+        self._files = LogFiles(path, robot, limit_bytes, sync=not isinstance(self._loop, VirtualTimeLoop))
         self._bus = bus
         self._events = events
         self._lost = 0

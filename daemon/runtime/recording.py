@@ -61,16 +61,18 @@ class Recording:
         motion: what leaves it.
         part: counts the runs of one long motion.
         now_s: loop time.
+        epoch_s: time of day at which that was zero; a clock that is set meanwhile changes nothing in this run.
 
     Attributes:
         folder: where its files are; None until the disk has made it, or where it cannot.
         failed: the disk failed: nothing more is recorded of it.
     """
 
-    def __init__(self, motion: Motion, part: int, now_s: float) -> None:
+    def __init__(self, motion: Motion, part: int, now_s: float, epoch_s: float) -> None:
         self.motion = motion
         self.part = part
         self.begun_s = self.flushed_s = now_s
+        self.epoch_s = epoch_s
         self.folder: Path | None = None
         self.failed = False
         self.facts: dict[str, Any] = {}

@@ -6,7 +6,6 @@ import asyncio
 import errno
 import logging
 import platform
-import time
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from functools import partial
@@ -27,7 +26,6 @@ from daemon.runs.store import (
     RunStore,
     make_yaml,
 )
-from daemon.runtime.clock import VirtualTimeLoop
 from daemon.runtime.cycle_rows import CycleRows
 from daemon.runtime.disk import Disk
 from daemon.runtime.fault_text import FaultText
@@ -35,6 +33,7 @@ from daemon.runtime.flight_recorder import KEPT_S, FlightRecorder, Slice
 from daemon.runtime.motions import Motion
 from daemon.runtime.recording import Pending, Recording, Step
 from daemon.runtime.supervisor import Supervisor
+from daemon.runtime.time_of_day import epoch_s
 from drivers.bus.candump import make_lines, pack_frame
 from drivers.bus.contract import Bus
 from drivers.epos.drive import EposDrive
@@ -78,8 +77,6 @@ class RunRecorder:
     def start(self) -> None:
         """Record every motion from now on, on the running loop."""
         self._loop = asyncio.get_running_loop()
-        virtual = isinstance(self._loop, VirtualTimeLoop)
-        self._epoch_s = 0.0 if virtual else time.time() - self._loop.time()
         self._disk = Disk(self._on_failure)
         self._rows = CycleRows(self._supervisor)
         self._pack = msgspec.msgpack.Encoder(enc_hook=str).encode
@@ -140,7 +137,7 @@ class RunRecorder:
     def _begin(self, motion: Motion, part: int = 1) -> None:
         self._end_closed()
         self.message, self.remedy, self._given_up = "", "", False
-        recording = Recording(motion, part, self._loop.time())
+        recording = Recording(motion, part, self._loop.time(), epoch_s())
         recording.facts = self._facts(recording)
         self._recordings.append(recording)
         drives = self._confirmed()
@@ -158,7 +155,7 @@ class RunRecorder:
     def _facts(self, recording: Recording) -> dict[str, Any]:
         motion = recording.motion
         return {
-            **self._place(recording.begun_s),
+            **self._place(recording.begun_s, recording.epoch_s),
             "kind": "motion",
             "motion": motion.kind,
             "asked": motion.asked,
@@ -166,9 +163,9 @@ class RunRecorder:
             "part": recording.part,
         }
 
-    def _place(self, begun_s: float) -> dict[str, Any]:
+    def _place(self, begun_s: float, epoch_s: float) -> dict[str, Any]:
         """Whose run it is, and since when; from loop time."""
-        vehicle, begun_unix_s = self._profile.vehicle, self._epoch_s + begun_s
+        vehicle, begun_unix_s = self._profile.vehicle, epoch_s + begun_s
         return {
             "robot": self._profile.name,
             "vehicle": vehicle.type if vehicle else None,
@@ -235,23 +232,23 @@ class RunRecorder:
     # --- faults ------------------------------------------------------------------------------------------------
 
     def _keep_fault(self, slices: Sequence[Slice]) -> None:
-        supervisor, now_s = self._supervisor, self._loop.time()
+        supervisor, now_s, clock_unix_s = self._supervisor, self._loop.time(), epoch_s()
         facts = {
             "kind": FAULT,
             "motion": ", ".join(motion.kind for motion in supervisor.motions.values()) or None,
-            "clock_unix_s": round(self._epoch_s, 6),
+            "clock_unix_s": round(clock_unix_s, 6),
             "ended": str(supervisor.state),
             "message": supervisor.message,
         }
         events = [event for event in supervisor.log.events if event["time_s"] >= now_s - KEPT_S]
-        text = FaultText(self._rows, self._make_frames, self._store.run_bytes)
+        text = FaultText(self._rows, partial(self._make_frames, clock_unix_s), self._store.run_bytes)
         self._disk.do_in_turns(
             *(partial(text.take, kept) for kept in reversed(slices)),
             partial(self._write_fault, text, now_s, facts, self._confirmed(), events),
         )
 
-    def _make_frames(self, packed: bytearray) -> bytes:
-        return make_lines(packed, self._epoch_s, self._bus.name)
+    def _make_frames(self, epoch_s: float, packed: bytearray) -> bytes:
+        return make_lines(packed, epoch_s, self._bus.name)
 
     def _write_fault(
         self,
@@ -262,7 +259,8 @@ class RunRecorder:
         events: list[dict[str, Any]],
     ) -> None:
         """In the disk's thread."""
-        facts = {**self._place(text.begun_s), **facts, "duration_s": round(now_s - text.begun_s, 3), "rows": text.rows}
+        place = self._place(text.begun_s, facts["clock_unix_s"])
+        facts = {**place, **facts, "duration_s": round(now_s - text.begun_s, 3), "rows": text.rows}
         files: dict[str, list[bytes]] = {
             FACTS: [make_yaml(facts)],
             PROFILE: [self._profile_yaml],
@@ -287,7 +285,7 @@ class RunRecorder:
 
     def _append(self, recording: Recording, pending: Pending) -> None:
         """In the disk's thread."""
-        recording.append(pending.files(self._rows, self._make_frames))
+        recording.append(pending.files(self._rows, partial(self._make_frames, recording.epoch_s)))
 
     def _on_failure(self, error: OSError) -> None:
         told = f"runs cannot be written to {self._store.folder}: {error.strerror or error}"
