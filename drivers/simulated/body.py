@@ -92,6 +92,7 @@ class BodyWorld(ABC):
         self._world_vx = self._world_vy = self._yaw_rate = 0.0
         self._step_s = step_s
         self._origin_s: float | None = None
+        self._advanced_s: float | None = None
         self._steps_done = 0
         self._quiet_steps = REST_STEPS
 
@@ -147,6 +148,8 @@ class BodyWorld(ABC):
 
     def advance(self, now_s: float) -> None:
         """Integrate up to ``now_s``; the first call sets the origin of time."""
+        if now_s == self._advanced_s:
+            return  # all nodes look at the same SYNC
         if self._origin_s is None:
             self._origin_s = now_s
         steps = int((now_s - self._origin_s) / self._step_s + 1e-6)
@@ -154,11 +157,17 @@ class BodyWorld(ABC):
             ahead_s = now_s - self._origin_s - steps * self._step_s
             for drive in self._drives:
                 drive.axis.ahead_s = ahead_s
+        self._integrate(steps)
+        self._advanced_s = now_s
+
+    def _integrate(self, steps: int) -> None:
+        """Integrate until so many steps are done."""
+        step = self._step_in_air if self.lifted else self._step
         while self._steps_done < steps:
             if self._a_demand_changes():
                 self._quiet_steps = 0
             if self._quiet_steps < REST_STEPS:
-                (self._step_in_air if self.lifted else self._step)()
+                step()
                 self._watch_for_rest()
             elif all(axis.torque_source is None for axis in self.axes.values()):
                 self._steps_done = steps
@@ -223,7 +232,7 @@ class BodyWorld(ABC):
 
     def _watch_for_rest(self) -> None:
         """Count the steps at rest; after enough of them take the last imperceptible motion away."""
-        if not self._is_slow():
+        if not -REST_SPEED < self._world_vx < REST_SPEED or not self._is_slow():
             self._quiet_steps = 0
             return
         self._quiet_steps += 1
@@ -231,13 +240,11 @@ class BodyWorld(ABC):
             self._come_to_rest()
 
     def _motions(self) -> tuple[float, ...]:
-        """Speeds that have to be small for rest, beside the body's own."""
-        return (self._yaw_rate, *(drive.rim_m_s for drive in self._drives))
+        """Speeds that have to be small for rest, beside the body's own forward speed."""
+        return (self._world_vy, self._yaw_rate, *(drive.rim_m_s for drive in self._drives))
 
     def _is_slow(self) -> bool:
         """Whether nothing moves faster than what counts as rest."""
-        if not (-REST_SPEED < self._world_vx < REST_SPEED and -REST_SPEED < self._world_vy < REST_SPEED):
-            return False
         return all(-REST_SPEED < motion < REST_SPEED for motion in self._motions())
 
     def _come_to_rest(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from math import inf
 
 from drivers.canopen.objects import Access, DataType, ObjectDef, ObjectTable
 
@@ -141,18 +142,25 @@ class SimulatedDictionary:
 
     def set_number(self, address: Address, value: int) -> None:
         """Check, store and let act one number. Raises SdoAbort."""
-        entry = self.objects[address]
-        if entry.high is not None and value > entry.high:
-            raise SdoAbort(TOO_HIGH)
-        if entry.low is not None and value < entry.low:
-            raise SdoAbort(TOO_LOW)
-        check = self.checks.get(address)
-        if check is not None:
-            check(value)
-        self.values[address] = value
-        action = self.actions.get(address)
-        if action is not None:
-            action(value)
+        self.setter(address)(value)
+
+    def setter(self, address: Address) -> Callable[[int], None]:
+        """A function that does to one number what :meth:`set_number` does."""
+        entry, values = self.objects[address], self.values
+        low = -inf if entry.low is None else entry.low
+        high = inf if entry.high is None else entry.high
+        check, action = self.checks.get(address), self.actions.get(address)
+
+        def set_value(value: int) -> None:
+            if not low <= value <= high:
+                raise SdoAbort(TOO_HIGH if value > high else TOO_LOW)
+            if check is not None:
+                check(value)
+            values[address] = value
+            if action is not None:
+                action(value)
+
+        return set_value
 
     def getter(self, address: Address) -> Callable[[], Value]:
         """A function that reads an object's present value."""

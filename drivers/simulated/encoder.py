@@ -141,22 +141,19 @@ class SimulatedEncoder(SimulatedNode):
         """Position value: whole counts within the measuring range."""
         return (self._raw() + self.dictionary.number("offset_value")) % self._range()
 
-    def _scaled(self) -> bool:
-        return bool(self.dictionary.number("operating_parameters") & _SCALED)
-
     def _range(self) -> int:
         number = self.dictionary.number
-        if self._scaled():
+        if number("operating_parameters") & _SCALED:
             return max(1, number("total_measuring_range"))
         return self._config.total_counts or self._config.counts_per_turn
 
     def _raw(self) -> int:
-        per_turn = self._config.counts_per_turn
-        reverse = self.dictionary.number("operating_parameters") & _REVERSED
-        sign = -self._config.direction if reverse else self._config.direction
+        config, per_turn = self._config, self._config.counts_per_turn
+        parameters = self.dictionary.number("operating_parameters")
+        sign = -config.direction if parameters & _REVERSED else config.direction
         angle = self.sensor.sense(self._world.heading_rad(self._pair))
-        counts = self._config.zero_counts + sign * angle / tau * per_turn
-        if self._scaled():
+        counts = config.zero_counts + sign * angle / tau * per_turn
+        if parameters & _SCALED:
             counts *= self.dictionary.number("measuring_units_per_turn") / per_turn
         return floor(counts + 0.5)
 

@@ -66,6 +66,7 @@ class Max2dWorld(BodyWorld):
         self._front = Pair(vehicle, simulation, 1, front_right, front_left)
         self.pairs = dict(zip(vehicle.encoders, (self._rear, self._front), strict=True))
         """Wheel pairs by the names of their encoders."""
+        self._pairs = (self._rear, self._front)
         steering = dict(zip(vehicle.brakes, (self._rear, self._front), strict=True))
         braked: dict[str, Pair | WheelDrive] = {
             name: steering[name] if brake.kind == "steering" else self.wheels[brake.drive].drive
@@ -121,7 +122,7 @@ class Max2dWorld(BodyWorld):
     def _feel(self, floor: Floor) -> None:
         """Each wheel stands on the friction of its place and time."""
         c, s, time_s = self._cos, self._sin, self.time_s
-        for pair in (self._rear, self._front):
+        for pair in self._pairs:
             for wheel, (x, y) in zip((pair.right, pair.left), pair.contact_points(), strict=True):
                 wheel.contact.stand_on(floor.friction(self._x_m + x * c - y * s, self._y_m + x * s + y * c, time_s))
 
@@ -129,14 +130,16 @@ class Max2dWorld(BodyWorld):
         """Yaw acceleration of the body with the pairs that are held, and turning of the pairs that are not."""
         inertia = self._yaw_inertia
         moment = 0.0
-        for pair in (self._rear, self._front):
+        turning = []
+        for pair in self._pairs:
             pair.hold()
             moment += pair.yaw_moment_n_m + pair.passed_n_m
             if not pair.held:
                 inertia -= pair.inertia_kg_m2
+                turning.append(pair)
         acceleration = moment / inertia
-        self._rear.turn(acceleration, dt)
-        self._front.turn(acceleration, dt)
+        for pair in turning:
+            pair.turn(acceleration, dt)
         return acceleration
 
     def _shift_loads(self, force_x: float, force_y: float, dt: float) -> None:

@@ -120,15 +120,16 @@ class ReceivePdo(Pdo):
     def __init__(
         self, dictionary: SimulatedDictionary, communication: int, mapping: int, may_remap: Callable[[], bool]
     ) -> None:
-        self._mapped: list[Address] = []
+        self._setters: list[Callable[[int], None]] = []
         self._pending: bytes | None = None
         super().__init__(dictionary, communication, mapping, frozenset((1, 255)), may_remap)
 
     def compile(self) -> list[Address]:
         """Take over the configuration; what was latched is dropped."""
-        self._mapped = super().compile()
+        mapped = super().compile()
+        self._setters = [self.dictionary.setter(address) for address in mapped]
         self._pending = None
-        return self._mapped
+        return mapped
 
     def accepts(self, data: bytes) -> bool:
         """Whether a frame has the mapped length."""
@@ -146,9 +147,8 @@ class ReceivePdo(Pdo):
 
     def apply(self, data: bytes) -> None:
         """Write the mapped objects. Raises SdoAbort at the first value that the device refuses."""
-        set_number = self.dictionary.set_number
-        for address, value in zip(self._mapped, self._layout.unpack(data), strict=True):
-            set_number(address, value)
+        for set_value, value in zip(self._setters, self._layout.unpack(data), strict=True):
+            set_value(value)
 
 
 class TransmitPdo(Pdo):

@@ -41,6 +41,12 @@ class Wheel:
         self.contact = contact
         self.load_n = load_n
 
+    def roll(self, roll_m_s: float, lateral_m_s: float, dt_s: float) -> None:
+        """Roll for one step, with the velocity of the contact point along and to the left of the heading."""
+        drive, contact, load = self.drive, self.contact, self.load_n
+        contact.deform(drive.rim_m_s, roll_m_s, lateral_m_s, load, dt_s)
+        drive.turn(contact.force_x_n, load, dt_s)
+
 
 class Pair:
     """Two wheels that steer together: one heading, one brake.
@@ -132,14 +138,15 @@ class Pair:
         swing = turning * self._arm_m + track * c
         along = vx * c + side * s
         across = side * c - vx * s + turning * self._lead_m
-        right_x, right_y = _roll_wheel(self.right, along + swing, across - track * s, dt_s)
-        left_x, left_y = _roll_wheel(self.left, along - swing, across + track * s, dt_s)
-        force_roll = right_x + left_x
-        force_lat = right_y + left_y
-        ahead = right_x - left_x
+        self.right.roll(along + swing, across - track * s, dt_s)
+        self.left.roll(along - swing, across + track * s, dt_s)
+        right, left = self.right.contact, self.left.contact
+        force_roll = right.force_x_n + left.force_x_n
+        force_lat = right.force_y_n + left.force_y_n
+        ahead = right.force_x_n - left.force_x_n
         self.force_x_n = force_roll * c - force_lat * s
         self.force_y_n = force_y = force_roll * s + force_lat * c
-        difference_x = ahead * c - (right_y - left_y) * s
+        difference_x = ahead * c - (right.force_y_n - left.force_y_n) * s
         self.yaw_moment_n_m = self.offset_m * force_y + self._half_track_m * difference_x
         self._push_n_m = self._lead_m * force_lat + self._arm_m * ahead + self.inertia_kg_m2 * self.rate_rad_s / dt_s
 
@@ -149,23 +156,13 @@ class Pair:
         limit = self._holding_n_m
         if abs(self.heading_rad) >= self._stop_rad and push * self.heading_rad > 0.0:
             limit = inf
-        self.held = -limit <= push <= limit
-        self.passed_n_m = push if self.held else copysign(limit, push)
+        if -limit <= push <= limit:
+            self.held, self.passed_n_m, self.rate_rad_s = True, push, 0.0
+        else:
+            self.held, self.passed_n_m = False, copysign(limit, push)
 
     def turn(self, yaw_acceleration: float, dt_s: float) -> None:
-        """Turn the pair for one step unless it is held."""
-        if self.held:
-            self.rate_rad_s = 0.0
-            return
+        """Turn a pair that is not held for one step."""
         rate = ((self._push_n_m - self.passed_n_m) / self.inertia_kg_m2 - yaw_acceleration) * dt_s
         self.rate_rad_s = rate
         self.place(self.heading_rad + rate * dt_s)
-
-
-def _roll_wheel(wheel: Wheel, roll_m_s: float, lateral_m_s: float, dt_s: float) -> tuple[float, float]:
-    """Roll one wheel for one step; returns the floor's force on it along and left of its heading [N]."""
-    drive, contact, load = wheel.drive, wheel.contact, wheel.load_n
-    contact.deform(drive.rim_m_s, roll_m_s, lateral_m_s, load, dt_s)
-    force = contact.force_x_n
-    drive.turn(force, load, dt_s)
-    return force, contact.force_y_n
