@@ -26,6 +26,7 @@ from drivers.contract import Drive
 from drivers.devices import Devices
 from drivers.simulated.bus import SimulatedPort
 from drivers.simulated.device_faults import Site
+from drivers.simulated.disk_trouble import DiskTrouble
 from drivers.simulated.faults import Faults
 from drivers.simulated.workshop import Workshop
 from profiles.faults import PlacedFault
@@ -133,11 +134,13 @@ class App:
             self.master, self.devices, period_s, self.supervisor.step, wire.pace, wire.reading_share, late
         )
         workshop = Workshop(built or profile, self.network) if self.network else None
+        self._disk = DiskTrouble()
         self.faults = self._make_faults(seed)
         self._faults_to_set = faults
         commands = Commands(self.supervisor, self.network, workshop, self.faults)
         self.service = Service(profile.name, self.supervisor, commands, self.bus, self.cycle, profile_file)
-        self.service.runs = RunRecorder(runs, self.supervisor, self.bus, profile, bus) if runs else None
+        if runs:
+            self.service.runs = RunRecorder(runs, self.supervisor, self.bus, profile, bus, self._disk)
         self._localise(commands)
         self._groups = groups
         self.server = self._serve(socket) if socket else None
@@ -149,7 +152,7 @@ class App:
         if self.network is None or self.medium is None:
             return None
         port = self.bus if isinstance(self.bus, SimulatedPort) else None
-        return Faults(Site(self.network, self.medium, port, self.wire.cable), seed)
+        return Faults(Site(self.network, self.medium, port, self.wire.cable, self._disk), seed)
 
     def _localise(self, commands: Commands) -> None:
         """Correct the vehicle's odometry by bearings, where its profile has reflectors."""
@@ -214,7 +217,7 @@ class App:
             await self.gateway.start()
         if self._record is not None:
             self.recorder = CandumpRecorder(
-                self.bus, self._record, self.profile.name, self.supervisor.log, self._record_bytes
+                self.bus, self._record, self.profile.name, self.supervisor.log, self._record_bytes, self._disk
             )
             self.recorder.start()
             self.service.recorder = self.recorder

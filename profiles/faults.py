@@ -49,6 +49,8 @@ KindName = Literal[
     "unplugged",
     "serial_noise",
     "brick_lost",
+    "disk_full",
+    "disk_slow",
 ]
 KIND_NAMES: tuple[str, ...] = get_args(KindName)
 Count = Annotated[int, Meta(ge=1, le=1_000_000_000)]
@@ -117,6 +119,8 @@ KINDS: dict[str, Kind] = {
     "unplugged": Kind("the daemon's adapter, or serial cable, is pulled out", (), (), ("for_s",)),
     "serial_noise": Kind("bytes on the serial line with a wrong bit", (), ("probability",), ("for_s",)),
     "brick_lost": Kind("an NXT brick out of range", ("bricks",), _AT_NODE, ("for_s",)),
+    "disk_full": Kind("the disk that the daemon records on takes nothing more", (), (), ("for_s",)),
+    "disk_slow": Kind("the disk that the daemon records on does each thing late", (), ("delay_s",), ("for_s",)),
 }  # fmt: skip
 
 
@@ -143,7 +147,7 @@ class Fault(Part, frozen=True, kw_only=True, omit_defaults=True):
     times: Count | None = None
     """How many of them it strikes at most."""
     delay_s: Positive | None = None
-    """By how much frames come late."""
+    """By how much frames come late, or a disk does what it is asked."""
     code: Annotated[int, Meta(ge=0, le=0xFFFF_FFFF)] | None = None
     """EMCY code, or SDO abort code."""
     value: Annotated[int, Meta(ge=0, le=0xFFFF_FFFF)] | None = None

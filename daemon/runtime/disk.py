@@ -9,6 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 
 from daemon.runtime.clock import VirtualTimeLoop
+from drivers.simulated.disk_trouble import DiskTrouble
 
 PAUSE_S = 0.01
 """Between two jobs that leave the control cycle its time."""
@@ -21,13 +22,15 @@ class Disk:
 
     Args:
         on_failure: called in the loop when a job has failed for what the disk said.
+        trouble: what faults make of a simulated robot's disk.
     """
 
-    def __init__(self, on_failure: Callable[[OSError], None]) -> None:
+    def __init__(self, on_failure: Callable[[OSError], None], trouble: DiskTrouble) -> None:
         self._loop = asyncio.get_running_loop()
         self._on_failure = on_failure
+        self._trouble = trouble
         self._pending_bytes = 0
-        self._in_turns: deque[Callable[[], None]] = deque()
+        self._waiting: deque[tuple[Callable[[], None], int]] = deque()
         self._timer: asyncio.TimerHandle | None = None
         virtual = isinstance(self._loop, VirtualTimeLoop)
         self._pool = None if virtual else ThreadPoolExecutor(1, "canhelm-runs")
@@ -42,35 +45,42 @@ class Disk:
         if size_bytes and self._pending_bytes + size_bytes > PENDING_LIMIT_BYTES:
             return False
         self._pending_bytes += size_bytes
+        if self._timer is None and not self._trouble.delay_s:
+            self._carry_out(job, size_bytes)
+        else:
+            self._waiting.append((job, size_bytes))
+            self._timer = self._timer or self._loop.call_later(self._trouble.delay_s, self._take_turn)
+        return True
+
+    def _carry_out(self, job: Callable[[], None], size_bytes: int) -> None:
         if self._pool is not None:
             self._pool.submit(job).add_done_callback(partial(self._done_in_thread, size_bytes))
-            return True
+            return
         error: BaseException | None = None
         try:
             job()
         except OSError as failure:
             error = failure
         self._done(size_bytes, error)
-        return True
 
     def do_in_turns(self, *jobs: Callable[[], None]) -> None:
         """Carry out jobs that compute for a while, with pauses in between: threads share one interpreter."""
-        self._in_turns.extend(jobs)
+        self._waiting.extend((job, 0) for job in jobs)
         if self._timer is None:
             self._take_turn()
 
     def _take_turn(self) -> None:
         self._timer = None
-        if self._in_turns:
-            self.do(self._in_turns.popleft())
-            self._timer = self._loop.call_later(PAUSE_S, self._take_turn)
+        if self._waiting:
+            self._carry_out(*self._waiting.popleft())
+            self._timer = self._loop.call_later(max(PAUSE_S, self._trouble.delay_s), self._take_turn)
 
     def close(self) -> None:
         """Wait until everything is done."""
         if self._timer is not None:
             self._timer.cancel()
-        while self._in_turns:
-            self.do(self._in_turns.popleft())
+        while self._waiting:
+            self._carry_out(*self._waiting.popleft())
         if self._pool is not None:
             self._pool.shutdown()
 

@@ -10,6 +10,7 @@ from io import FileIO
 from pathlib import Path
 
 from daemon.runs.store import RESERVE_BYTES, no_room
+from drivers.simulated.disk_trouble import DiskTrouble
 
 PARTS = 8
 """A file takes this part of all room; then the next one begins."""
@@ -27,6 +28,7 @@ class LogFiles:
         robot: the robot's name.
         limit_bytes: what the robot's logs of the folder may take together; the oldest are deleted.
         sync: have what was written on the disk once a second (fdatasync(2)), against a power cut.
+        trouble: what faults make of a simulated robot's disk.
 
     Attributes:
         path: the file that is written to, once it is open.
@@ -34,7 +36,7 @@ class LogFiles:
         lost: lines that were given up.
     """
 
-    def __init__(self, path: Path, robot: str, limit_bytes: int, *, sync: bool) -> None:
+    def __init__(self, path: Path, robot: str, limit_bytes: int, *, sync: bool, trouble: DiskTrouble) -> None:
         self.path = path
         self.failing = False
         self.lost = 0
@@ -42,6 +44,7 @@ class LogFiles:
         self._robot = robot
         self._limit_bytes = limit_bytes
         self._sync = sync
+        self._trouble = trouble
         self._synced_s = -math.inf
         self._size_bytes = 0
         self._unwritten = bytearray()
@@ -67,6 +70,7 @@ class LogFiles:
             self.lost += lines.count(b"\n")
         else:
             self._unwritten += lines
+        self._trouble.require_room()
         if now_s >= self._synced_s + SYNC_PERIOD_S:
             self._bring_to_disk()
             self._make_room()

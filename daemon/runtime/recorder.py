@@ -15,6 +15,7 @@ from daemon.runtime.log_files import LogFiles
 from daemon.runtime.time_of_day import epoch_s
 from drivers.bus.candump import PACKED_BYTES, make_lines, pack_frame
 from drivers.bus.contract import Bus
+from drivers.simulated.disk_trouble import DiskTrouble
 
 WRITE_PERIOD_S = 0.1
 """What the end of the process by a signal that nobody can catch may cost."""
@@ -38,18 +39,29 @@ class CandumpRecorder:
         robot: the robot's name.
         events: where a disk that fails is told.
         limit_bytes: what the logs of a folder may take.
+        trouble: what faults make of a simulated robot's disk.
 
     Attributes:
         frames: frames seen.
         errors: attempts to write that failed.
     """
 
-    def __init__(self, bus: Bus, path: Path, robot: str, events: EventLog, limit_bytes: int = LIMIT_BYTES) -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        path: Path,
+        robot: str,
+        events: EventLog,
+        limit_bytes: int = LIMIT_BYTES,
+        trouble: DiskTrouble | None = None,
+    ) -> None:
         self.frames = 0
         self.errors = 0
         self._loop = asyncio.get_running_loop()
         self._epoch_s = epoch_s()
-        self._files = LogFiles(path, robot, limit_bytes, sync=not isinstance(self._loop, VirtualTimeLoop))
+        self._trouble = trouble or DiskTrouble()
+        sync = not isinstance(self._loop, VirtualTimeLoop)
+        self._files = LogFiles(path, robot, limit_bytes, sync=sync, trouble=self._trouble)
         self._bus = bus
         self._events = events
         self._lost = 0
@@ -77,7 +89,7 @@ class CandumpRecorder:
                 f"cannot create the log {self.path}: {error.strerror}",
                 remedy="name a folder that this user may write to, or a new file",
             ) from error
-        self._disk = Disk(self._on_failure)
+        self._disk = Disk(self._on_failure, self._trouble)
         self._bus.taps.append(self._record)
 
     def close(self) -> None:

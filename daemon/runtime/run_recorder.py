@@ -37,6 +37,7 @@ from daemon.runtime.time_of_day import epoch_s
 from drivers.bus.candump import make_lines, pack_frame
 from drivers.bus.contract import Bus
 from drivers.epos.drive import EposDrive
+from drivers.simulated.disk_trouble import DiskTrouble
 from profiles.schema import Profile
 
 LOGGER = logging.getLogger("canhelm.runs")
@@ -57,19 +58,29 @@ class RunRecorder:
         bus: whose frames are recorded while something moves.
         profile: the robot as it is run.
         spec: of the bus.
+        trouble: what faults make of a simulated robot's disk.
 
     Attributes:
         message: what the disk said of the newest run; empty while it works.
         remedy: what mends that.
     """
 
-    def __init__(self, store: RunStore, supervisor: Supervisor, bus: Bus, profile: Profile, spec: str) -> None:
+    def __init__(
+        self,
+        store: RunStore,
+        supervisor: Supervisor,
+        bus: Bus,
+        profile: Profile,
+        spec: str,
+        trouble: DiskTrouble | None = None,
+    ) -> None:
         self.message = self.remedy = ""
         self._store = store
         self._supervisor = supervisor
         self._bus = bus
         self._profile = profile
         self._spec = spec
+        self._trouble = trouble or DiskTrouble()
         self._recordings: list[Recording] = []
         self._last: Path | None = None
         self._given_up = False
@@ -77,7 +88,7 @@ class RunRecorder:
     def start(self) -> None:
         """Record every motion from now on, on the running loop."""
         self._loop = asyncio.get_running_loop()
-        self._disk = Disk(self._on_failure)
+        self._disk = Disk(self._on_failure, self._trouble)
         self._rows = CycleRows(self._supervisor)
         self._pack = msgspec.msgpack.Encoder(enc_hook=str).encode
         self._profile_yaml = make_yaml(self._profile)
@@ -145,6 +156,7 @@ class RunRecorder:
 
     def _make_folder(self, recording: Recording, facts: dict[str, Any], drives: dict[str, Any]) -> None:
         """In the disk's thread: the folder, and what is known before the first cycle."""
+        self._trouble.require_room()
         folder = self._store.begin()
         (folder / PROFILE).write_bytes(self._profile_yaml)
         (folder / DRIVES).write_bytes(make_yaml(drives))
@@ -268,6 +280,7 @@ class RunRecorder:
             EVENTS: [msgspec.json.encode(event) + b"\n" for event in events],
             **text.files(),
         }
+        self._trouble.require_room()
         self._last = folder = self._store.keep(files)
         told = f"the last {facts['duration_s']:.1f} s before it are run {int(folder.name)}"
         self._loop.call_soon_threadsafe(
@@ -285,6 +298,7 @@ class RunRecorder:
 
     def _append(self, recording: Recording, pending: Pending) -> None:
         """In the disk's thread."""
+        self._trouble.require_room()
         recording.append(pending.files(self._rows, partial(self._make_frames, recording.epoch_s)))
 
     def _on_failure(self, error: OSError) -> None:

@@ -13,6 +13,7 @@ from drivers.canopen.objects import parse_address
 from drivers.epos.codes import EMERGENCIES
 from drivers.simulated.bus import SimulatedBus, SimulatedPort
 from drivers.simulated.dictionary import Address, Value
+from drivers.simulated.disk_trouble import DiskTrouble
 from drivers.simulated.encoder import SimulatedEncoder
 from drivers.simulated.epos import SimulatedEpos
 from drivers.simulated.network import SimulatedNetwork
@@ -60,6 +61,7 @@ class Site:
         medium: its bus.
         port: by which the daemon, or the interface to it, is on that bus; None where it is not.
         cable: of a simulated serial line; None where there is none.
+        disk: that the daemon records on; None where it is in another process.
         shafts: between motors and drives whose encoders were broken once, by the drives' names.
     """
 
@@ -67,6 +69,7 @@ class Site:
     medium: SimulatedBus
     port: SimulatedPort | None = None
     cable: SerialCable | None = None
+    disk: DiskTrouble | None = None
     shafts: dict[str, FaultyShaft] = field(default_factory=dict)
 
 
@@ -331,6 +334,19 @@ def _brick_lost(site: Site, fault: Fault, _: Random) -> Effect:
     return Effect(leave, lambda: setattr(link, "reachable", True))
 
 
+# The daemon's disk
+
+
+def _disk_fault(site: Site, fault: Fault, _: Random) -> Effect:
+    disk = site.disk
+    if disk is None:
+        remedy = "set it in `canhelm run --simulate`"
+        raise UsageError("the daemon is in another process", object="kind", value=fault.kind, remedy=remedy)
+    if fault.kind == "disk_full":
+        return Effect(lambda: setattr(disk, "full", True), lambda: setattr(disk, "full", False))
+    return Effect(lambda: setattr(disk, "delay_s", fault.delay_s), lambda: setattr(disk, "delay_s", 0.0))
+
+
 MAKERS: dict[str, Maker] = {
     "node_reset": _node_reset,
     "power_cycle": _power_cycle,
@@ -345,4 +361,5 @@ MAKERS: dict[str, Maker] = {
     **dict.fromkeys(("bus_off", "unplugged"), _adapter_fault),
     "serial_noise": _serial_noise,
     "brick_lost": _brick_lost,
+    **dict.fromkeys(("disk_full", "disk_slow"), _disk_fault),
 }

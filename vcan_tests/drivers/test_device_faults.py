@@ -6,7 +6,9 @@ import asyncio
 from typing import Any
 
 import msgspec
+import pytest
 
+from canhelm.errors import UsageError
 from drivers.simulated.bus import SimulatedBus
 from drivers.simulated.device_faults import Site
 from drivers.simulated.faults import Faults
@@ -64,3 +66,9 @@ async def test_a_power_cycle_gives_no_power_to_a_node_that_had_none() -> None:
     robot.set("power_cycle", for_s=0.5)
     await asyncio.sleep(1.0)
     assert not robot.network.drives[PART].powered
+
+
+@pytest.mark.parametrize("fault", [{"kind": "disk_full"}, {"kind": "disk_slow", "delay_s": 1.0}])
+async def test_a_network_without_its_daemon_has_no_disk_to_break(fault: dict[str, Any]) -> None:
+    with pytest.raises(UsageError, match="the daemon is in another process"):
+        Robot().faults.add(msgspec.convert(fault, Fault))

@@ -10,8 +10,8 @@ from drivers.epos.codes import EMERGENCIES
 from profiles.faults import KIND_NAMES, KINDS
 from profiles.schema import Profile
 
-ELSEWHERE: Final = ("serial_noise", "brick_lost")
-"""Kinds that a robot on a CAN bus does not know."""
+ELSEWHERE: Final = ("serial_noise", "brick_lost", "disk_full", "disk_slow")
+"""Kinds that a robot on a CAN bus does not know, and those of its computer."""
 OBJECTS: Final = ("0x1000", "0x1018/1", "0x6040", "0x6041", "0x6060", "0x6064", "0x6083")
 OPTIONAL: Final = 0.5
 """Chance of what may be given and need not."""

@@ -101,8 +101,12 @@ STRIKES: Final[dict[str, Strike]] = {
 }
 """What strikes, by the name that the command takes and the table shows. Times and shares are the campaign's choice."""
 
-OTHER_ROBOTS: Final = {"serial_noise": "needs a serial line", "brick_lost": "needs a brick"}
-"""Kinds of faults that the MAX2D on CAN cannot have."""
+OTHER_ROBOTS: Final = {
+    "serial_noise": "needs a serial line",
+    "brick_lost": "needs a brick",
+    **dict.fromkeys(("disk_full", "disk_slow"), "needs a recording"),
+}
+"""Kinds of faults that a MAX2D on CAN, of which nothing is recorded, cannot have."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
