@@ -17,7 +17,7 @@ from canhelm.errors import UsageError
 from daemon.app import App
 from daemon.demo_robot import DemoRobot
 from daemon.loops.geometry import solve_turning
-from daemon.loops.odometry import least_squares
+from daemon.loops.least_squares import least_squares
 from profiles.faults import PlacedFault
 from profiles.schema import PairedSteerGeometry, Profile
 

@@ -9,10 +9,9 @@ from __future__ import annotations
 import asyncio
 import math
 import zlib
-from dataclasses import astuple
 from typing import Final
 
-from msgspec.structs import replace
+from msgspec.structs import astuple, replace
 
 from canhelm.errors import CanhelmError
 from daemon.campaigns.cases import DURATION_S, PERIOD_S, SPEED_M_S, Case, Outcome
@@ -58,7 +57,8 @@ async def _drive(case: Case, run: Run) -> str:
     assert isinstance(vehicle, SemitrailerVehicle)
     assert isinstance(world, SemitrailerWorld)
     start = placed(piece, errors_of(case))
-    world.place(astuple(start.truck), start.bending_rad, start.steering_rad)
+    x_m, y_m, yaw_rad = astuple(start.truck)
+    world.place((x_m, y_m, yaw_rad), start.bending_rad, start.steering_rad)
     vehicle.locate(start.truck)
     await robot.app.start()
     try:

@@ -67,7 +67,7 @@ class Gate:
         if self._paired and measurement.brake_engaged:
             speeds = self._interlock(speeds, measurement, active)
             release = self._limit_release(release, measurement, active)
-        return Command(tuple(speeds), release), tuple(dict.fromkeys(active))
+        return Command(tuple(speeds), release), tuple(dict.fromkeys(active)) if active else ()
 
     def _limit_speed(self, speeds: list[float], active: list[str]) -> list[float]:
         fastest = max(map(abs, speeds), default=0.0)

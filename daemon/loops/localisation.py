@@ -18,7 +18,8 @@ from collections.abc import Sequence
 from itertools import combinations
 from typing import Final, NamedTuple
 
-from daemon.loops.odometry import Pose, least_squares
+from daemon.loops.least_squares import least_squares
+from daemon.loops.odometry import Pose
 from daemon.loops.path import Point, wrap
 
 Sighting = tuple[Point, float]

@@ -7,11 +7,10 @@ rear, front).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import msgspec
 
 
-@dataclass(frozen=True, slots=True)
-class Measurement:
+class Measurement(msgspec.Struct, frozen=True, gc=False):
     """One cycle's readings.
 
     Attributes:
@@ -35,8 +34,7 @@ class Measurement:
     motor_current_a: tuple[float, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Command:
+class Command(msgspec.Struct, frozen=True, gc=False):
     """What a law asks for in one cycle.
 
     Attributes:

@@ -92,17 +92,25 @@ class CurrentAndMotion:
             commanded_m_s: what it was commanded since the last look.
             dt_s: since then.
         """
-        limits = self.limits
         lacks_m_s = commanded_m_s - speed_m_s
+        if abs(lacks_m_s) >= self.limits.late_m_s or self._misfit is not None:
+            misfit = self._late(current_a, lacks_m_s, speed_m_s, commanded_m_s, dt_s)
+            if misfit is not None:
+                return misfit
+        return self._dragged(current_a, abs(speed_m_s))
+
+    def _late(
+        self, current_a: float, lacks_m_s: float, speed_m_s: float, commanded_m_s: float, dt_s: float
+    ) -> Misfit | None:
+        """What has not fitted for long enough with a wheel that lacks speed."""
+        limits = self.limits
         towards = 1.0 if lacks_m_s > 0 else -1.0
         misfit = self._misfit_of(current_a * towards, lacks_m_s, commanded_m_s)
         gained_m_s = (speed_m_s - self._begin_m_s) * towards
         if misfit is not self._misfit or gained_m_s >= VAIN_SHARE * limits.gain_m_s:
             self._misfit, self._begin_m_s, self._since_s = misfit, speed_m_s, 0.0
         self._since_s += dt_s
-        if misfit and self._since_s >= limits.time_s:
-            return misfit
-        return self._dragged(current_a, abs(speed_m_s))
+        return misfit if self._since_s >= limits.time_s else None
 
     def _misfit_of(self, towards_a: float, lacks_m_s: float, commanded_m_s: float) -> Misfit | None:
         limits = self.limits

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from functools import partial
 from typing import Final
 
+import msgspec
+
 from daemon.loops.geometry import FRONT, REAR, TURN_SIGN, WHEELS_OF_PAIR, PerPair
+from daemon.loops.least_squares import Fits, Row
 from daemon.loops.measurement import Measurement
 from profiles.schema import PairedSteerGeometry
 
@@ -15,11 +19,8 @@ MAX_STEP_M: Final = 0.5
 MAX_TURN_RAD: Final = 0.5
 """The same for the heading of a pair."""
 
-Row = tuple[float, float, float]
 
-
-@dataclass(frozen=True, slots=True)
-class Pose:
+class Pose(msgspec.Struct, frozen=True, gc=False):
     """Position and attitude of the robot's centre in the frame where the odometry was reset."""
 
     x_m: float = 0.0
@@ -56,7 +57,8 @@ class Odometry:
     """
 
     def __init__(self, geometry: PairedSteerGeometry) -> None:
-        self._geometry = geometry
+        self._offset_m = geometry.contact_offset_m
+        self._fits = Fits(partial(body_rows, geometry))
         self._last: Measurement | None = None
         self.pose = Pose()
         self.skipped = 0
@@ -72,7 +74,7 @@ class Odometry:
             return self.pose
         rolled = [new - old for new, old in zip(measurement.wheel_travel_m, last.wheel_travel_m, strict=True)]
         turned = [new - old for new, old in zip(measurement.heading_rad, last.heading_rad, strict=True)]
-        if not (all(abs(way) <= MAX_STEP_M for way in rolled) and all(abs(turn) <= MAX_TURN_RAD for turn in turned)):
+        if not (_within(rolled, MAX_STEP_M) and _within(turned, MAX_TURN_RAD)):
             self.skipped += 1
             return self.pose
         if any(rolled) or any(turned):
@@ -82,42 +84,29 @@ class Odometry:
 
     def _body_motion(self, heading_rad: PerPair, rolled_m: list[float], turned_rad: list[float]) -> Row:
         """The twist (dx, dy, dyaw) at the mean headings."""
-        offset_m = self._geometry.contact_offset_m
-        values: list[float] = []
-        for pair in (REAR, FRONT):
-            turned_m = offset_m * turned_rad[pair]
-            values.extend(rolled_m[wheel] - TURN_SIGN[wheel] * turned_m for wheel in WHEELS_OF_PAIR[pair])
-            values.append(0.0)
-        return least_squares(body_rows(self._geometry, heading_rad), values)
+        if any(turned_rad):
+            turned_m = [self._offset_m * turn for turn in turned_rad]
+            rolled_m = [way - TURN_SIGN[wheel] * turned_m[wheel // 2] for wheel, way in enumerate(rolled_m)]
+        return self._fits.at(heading_rad).unknowns(rolled_m)
 
 
-def body_rows(geometry: PairedSteerGeometry, heading_rad: PerPair) -> list[Row]:
-    """What a twist of the body makes of each pair: the ways of its two wheels, and the way of its middle to the side.
+def _within(values: list[float], limit: float) -> bool:
+    """Whether no value is beyond a limit; one that is no number is."""
+    return all(map(limit.__ge__, map(abs, values)))
+
+
+def body_rows(geometry: PairedSteerGeometry, heading_rad: Sequence[float]) -> list[Row]:
+    """What a twist of the body makes of the wheels: their ways, and then of each pair that of its middle to the side.
 
     A point (x, y) moves along a heading p by (cos p, sin p, x sin p - y cos p) times the twist, and to its left by
     (-sin p, cos p, x cos p + y sin p) times it; the contact points of ``daemon.loops.geometry`` are put in.
     """
     rows: list[Row] = []
+    middles: list[Row] = []
     for pair, end in ((REAR, -1.0), (FRONT, 1.0)):
         cos, sin = math.cos(heading_rad[pair]), math.sin(heading_rad[pair])
         axis_m = end * geometry.wheelbase_m / 2
         arm_m = geometry.pivot_track_m / 2 * cos + geometry.contact_offset_m
         rows.extend((cos, sin, axis_m * sin + TURN_SIGN[wheel] * arm_m) for wheel in WHEELS_OF_PAIR[pair])
-        rows.append((-sin, cos, axis_m * cos + end * geometry.contact_lead_m))
-    return rows
-
-
-def least_squares(rows: list[Row], values: list[float]) -> Row:
-    """The three unknowns that fit the equations ``row . unknowns = value`` best: normal equations by Cramer's rule."""
-    a = b = c = d = e = f = p = q = r = 0.0
-    for (x, y, z), value in zip(rows, values, strict=True):
-        a, b, c = a + x * x, b + x * y, c + x * z
-        d, e, f = d + y * y, e + y * z, f + z * z
-        p, q, r = p + x * value, q + y * value, r + z * value
-    minor_a, minor_b, minor_c = d * f - e * e, c * e - b * f, b * e - c * d
-    determinant = a * minor_a + b * minor_b + c * minor_c
-    return (
-        (minor_a * p + minor_b * q + minor_c * r) / determinant,
-        (minor_b * p + (a * f - c * c) * q + (b * c - a * e) * r) / determinant,
-        (minor_c * p + (b * c - a * e) * q + (a * d - b * b) * r) / determinant,
-    )
+        middles.append((-sin, cos, axis_m * cos + end * geometry.contact_lead_m))
+    return rows + middles

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
+
+import msgspec
 
 from canhelm.errors import CanhelmError
 from daemon.loops.geometry import (
@@ -58,8 +59,7 @@ class Phase(StrEnum):
     FAILED = "failed"
 
 
-@dataclass(frozen=True, slots=True)
-class PairedSteerRecord:
+class PairedSteerRecord(msgspec.Struct, frozen=True, gc=False):
     """The terms of one step.
 
     Attributes:

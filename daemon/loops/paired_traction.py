@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from daemon.loops.geometry import FRONT, REAR, TURN_SIGN, WHEELS_OF_PAIR, PerPair, solve_turning
-from daemon.loops.odometry import least_squares
+from daemon.loops.least_squares import least_squares
 from daemon.loops.slip_observer import Body, Observed, RimDrive, Row, SlipObserver, rim_drive
 from daemon.loops.wheel_grip import WheelGrip, WheelGripRecord
 from profiles.schema import PairedSteerGeometry, Profile

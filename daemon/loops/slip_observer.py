@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from statistics import median
 from typing import Final
 
-from daemon.loops.odometry import least_squares
+from daemon.loops.least_squares import least_squares
 from profiles.schema import DriveConfig, TractionConfig
 
 Row = tuple[float, float, float]

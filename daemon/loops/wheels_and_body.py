@@ -11,7 +11,8 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from daemon.loops.odometry import Row, body_rows, least_squares
+from daemon.loops.least_squares import Fit, Row
+from daemon.loops.odometry import body_rows
 from daemon.loops.plausibility import Contradiction
 from profiles.schema import OmniGeometry, PairedSteerGeometry, Profile
 from profiles.steered import CarGeometry
@@ -34,8 +35,7 @@ def rows_of(profile: Profile, heading_rad: Sequence[float]) -> list[Row]:
     """
     vehicle = profile.vehicle
     if isinstance(vehicle, PairedSteerGeometry):
-        first, second, rear, third, fourth, front = body_rows(vehicle, (heading_rad[0], heading_rad[1]))
-        return [first, second, third, fourth, rear, front]
+        return body_rows(vehicle, heading_rad)
     if isinstance(vehicle, CarGeometry):
         half, cos, sin = vehicle.track_m / 2, math.cos(heading_rad[0]), math.sin(heading_rad[0])
         return [(1.0, 0.0, -half), (1.0, 0.0, half), (0.0, 1.0, 0.0), (-sin, cos, vehicle.wheelbase_m * cos)]
@@ -76,12 +76,12 @@ class WheelsAndBody:
         self._travel_m = ()
 
     def look(
-        self, rows: Sequence[Row], travel_m: Sequence[float], commanded_m_s: Sequence[float], dt_s: float
+        self, fit: Fit, travel_m: Sequence[float], commanded_m_s: Sequence[float], dt_s: float
     ) -> Contradiction | None:
         """The wheel that is farthest from its command, where some wheel is off by more than the limit; or None.
 
         Args:
-            rows: of the wheels, then others.
+            fit: of the body to its wheels.
             travel_m: what each wheel has rolled.
             commanded_m_s: rim speed of each that was commanded since the last look.
             dt_s: since then.
@@ -90,18 +90,17 @@ class WheelsAndBody:
             self._travel_m, self._left_m = travel_m, [0.0] * len(travel_m)
             self._off_m, self._fastest_m_s = [0.0] * len(travel_m), 0.0
             return None
-        ways = [new - old for new, old in zip(travel_m, self._travel_m, strict=True)]
-        self._travel_m = travel_m
-        off = [way - speed * dt_s for way, speed in zip(ways, commanded_m_s, strict=True)]
-        values = off + [0.0] * (len(rows) - len(off))
-        motion = least_squares(list(rows), values)
+        before, self._travel_m = self._travel_m, travel_m
+        off = [new - old - speed * dt_s for new, old, speed in zip(travel_m, before, commanded_m_s, strict=True)]
+        dx, dy, dyaw = fit.unknowns(off)
         kept = math.exp(-dt_s / FORGETTING_S)
-        for wheel, (value, row) in enumerate(zip(off, rows, strict=False)):
-            explained = row[0] * motion[0] + row[1] * motion[1] + row[2] * motion[2]
-            self._left_m[wheel] = kept * self._left_m[wheel] + value - explained
-            self._off_m[wheel] = kept * self._off_m[wheel] + value
+        self._left_m = [
+            kept * left + value - (x * dx + y * dy + turn * dyaw)
+            for left, value, (x, y, turn) in zip(self._left_m, off, fit.rows, strict=False)
+        ]
+        self._off_m = [kept * before + value for before, value in zip(self._off_m, off, strict=True)]
         left_m = max(map(abs, self._left_m))
-        self._fastest_m_s = max(kept * self._fastest_m_s, *map(abs, commanded_m_s))
+        self._fastest_m_s = max(kept * self._fastest_m_s, max(map(abs, commanded_m_s)))
         limit_m = self._limit_m + LAG_S * self._fastest_m_s
         if left_m <= limit_m:
             return None

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Final
 
 from canhelm.errors import DeviceFault
+from daemon.loops.least_squares import Fits
 from daemon.loops.measurement import Command, Measurement
 from daemon.loops.motor_current import CurrentAndMotion, Misfit, current_limits
 from daemon.loops.plausibility import AxisTurning, EncoderJumps, Turning
@@ -55,8 +57,9 @@ class Plausibility:
         self._jumps = EncoderJumps(rates_rad_s, jump_margins_rad(profile, names), 1.0 / profile.network.cycle_hz)
         limits_rad = turning_limits_rad(profile, names)
         self._axes = tuple((axis, AxisTurning(limits_rad[axis.encoder])) for axis in steered_axes(profile))
-        self._vehicle, self._profile, self._drives = vehicle, profile, vehicle.drives
-        self._body = WheelsAndBody(wheel_limit_m(profile))
+        self._vehicle, self._drives = vehicle, vehicle.drives
+        self._body, self._wheels = WheelsAndBody(wheel_limit_m(profile)), wheels_of(profile)
+        self._fits = Fits(partial(rows_of, profile))
         self._currents = tuple(
             (index, config.direction, CurrentAndMotion(current_limits(profile, config)))
             for index, drive in enumerate(vehicle.drives)
@@ -109,12 +112,12 @@ class Plausibility:
         if not (driving and all(measurement.brake_engaged)):
             self._body.begin_anew()
             return None
-        rows = rows_of(self._profile, measurement.heading_rad)
-        if not rows:
+        fit = self._fits.at(measurement.heading_rad)
+        if not fit.rows:
             return None
-        wheels = wheels_of(self._profile)
+        wheels = self._wheels
         commanded_m_s = command.wheel_speed_m_s[:wheels]
-        found = self._body.look(rows, measurement.wheel_travel_m[:wheels], commanded_m_s, dt_s)
+        found = self._body.look(fit, measurement.wheel_travel_m[:wheels], commanded_m_s, dt_s)
         if found is None:
             return None
         drive, off, limit = self._drives[found.index], round(found.value, 4), round(found.limit, 4)

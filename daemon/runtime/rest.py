@@ -18,8 +18,8 @@ class RestWatch:
 
     def look(self, wheel_speed_m_s: tuple[float, ...]) -> None:
         """Take one cycle's rim speeds."""
-        at_rest = all(-AT_REST_M_S < speed < AT_REST_M_S for speed in wheel_speed_m_s)
-        self._cycles = self._cycles + 1 if at_rest else 0
+        fastest_m_s = max(map(abs, wheel_speed_m_s), default=0.0)
+        self._cycles = self._cycles + 1 if fastest_m_s < AT_REST_M_S else 0
         if self._waiters and self._cycles >= AT_REST_CYCLES:
             for waiter in self._waiters:
                 if not waiter.done():

@@ -231,24 +231,26 @@ class Supervisor:
 
     def step(self, now_s: float, dt_s: float) -> None:
         """One control step: measure, watch, ask the motions, pass the gate, transmit."""
-        measurement = self.measurement = self.vehicle.measure(now_s)
-        self._stopping.rest.look((*measurement.wheel_speed_m_s, *[drive.speed_m_s for drive in self.vehicle.aside]))
+        vehicle = self.vehicle
+        measurement = self.measurement = vehicle.measure(now_s)
+        self._stopping.rest.look((*measurement.wheel_speed_m_s, *[drive.speed_m_s for drive in vehicle.aside]))
         self._holding.watch(now_s)
         self._watch_devices(now_s)
         self._watch_readings(measurement, dt_s)
         wanted = self._ask_motions(measurement, dt_s)
-        self.command, self.active_limits = self.vehicle.gate(wanted, measurement, self.command, dt_s)
-        if self.command.release_brake:
-            self.brakes.follow(self.command.release_brake)
-        deadline = now_s + self._stale_s
-        for drive, speed in zip(self.vehicle.drives, self.command.wheel_speed_m_s, strict=True):
-            if drive.node_state is NodeState.READY:
+        command, self.active_limits = vehicle.gate(wanted, measurement, self.command, dt_s)
+        self.command = command
+        if command.release_brake:
+            self.brakes.follow(command.release_brake)
+        deadline, ready = now_s + self._stale_s, NodeState.READY
+        for drive, speed in zip(vehicle.drives, command.wheel_speed_m_s, strict=True):
+            if drive.node_state is ready:
                 drive.command_speed(speed)
                 drive.transmit(deadline)
-        for drive in self.vehicle.aside:
-            if drive.node_state is NodeState.READY:
+        for drive in vehicle.aside:
+            if drive.node_state is ready:
                 drive.transmit(deadline)
-        self.vehicle.observe(measurement)
+        vehicle.observe(measurement)
         for observer in self.observers:
             observer()
 
@@ -277,7 +279,7 @@ class Supervisor:
 
     def _watch_readings(self, measurement: Measurement, dt_s: float) -> None:
         powered = self.powered and not self._stopping.latched
-        driving = any(motion.kind in self.vehicle.methods for motion in self.motions.values())
+        driving = powered and any(motion.kind in self.vehicle.methods for motion in self.motions.values())
         fault = self._plausibility.look(measurement, self.command, dt_s, powered=powered, driving=driving)
         if fault is not None:
             self.fault(fault)

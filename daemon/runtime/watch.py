@@ -20,6 +20,15 @@ LATE_CYCLES = 2
 """Cycles between two looks from which on the daemon itself counts as late."""
 
 
+class _Unread:
+    """Looks at a device since its last reading."""
+
+    __slots__ = ("cycles", "since_s")
+
+    def __init__(self) -> None:
+        self.since_s, self.cycles = -math.inf, 0
+
+
 class DeviceWatch:
     """Finds the first reason to stop.
 
@@ -36,7 +45,7 @@ class DeviceWatch:
         self._by_node = devices.by_node
         self._period_s = period_s
         self._late_s = LATE_CYCLES * late_after_cycles * period_s
-        self._unread: dict[int, tuple[float, int]] = {}
+        self._unread = {node: _Unread() for node in devices.by_node}
         self._looked_s: float | None = None
         self._stall_end_s = -math.inf
         self._stall_s = 0.0
@@ -56,23 +65,21 @@ class DeviceWatch:
             fault = device.fault
             if fault is not None and (powered or fault.code != 0):
                 return DeviceFault(fault.message, node=fault.node, value=fault.code or None, remedy=fault.remedy)
-            if self._cycles_unread(device) > SILENT_CYCLES and powered and device.node_state is NodeState.READY:
+            unread = self._unread[device.node]
+            if device.reading_time_s != unread.since_s:
+                unread.since_s, unread.cycles = device.reading_time_s, 0
+                continue
+            unread.cycles += 1
+            if unread.cycles > SILENT_CYCLES and powered and device.node_state is NodeState.READY:
                 return self._silence(device, *self._who_is_silent(device), now_s)
         return None
-
-    def _cycles_unread(self, device: CanopenDevice) -> int:
-        """Looks since the device's last reading."""
-        reading_s, cycles = self._unread.get(device.node, (-math.inf, 0))
-        cycles = cycles + 1 if device.reading_time_s == reading_s else 0
-        self._unread[device.node] = (device.reading_time_s, cycles)
-        return cycles
 
     def _who_is_silent(self, device: CanopenDevice) -> tuple[str, str]:
         """What is silent, and what to do: the interface, all nodes, or this one."""
         trouble = self._bus.trouble
         if trouble is not None:
             return trouble.message, trouble.remedy or ""
-        if all(cycles >= SILENT_CYCLES for _, cycles in self._unread.values()):
+        if all(unread.cycles >= SILENT_CYCLES for unread in self._unread.values()):
             return "no node answers", "check the cable to the robot, and its power"
         return f"{device.who} is silent", "check its power and the CAN cable"
 

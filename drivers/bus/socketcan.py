@@ -30,6 +30,7 @@ from drivers.bus.socketcan_frames import (
     LONGEST_PACKET_BYTES,
     SO_RXQ_OVFL,
     SO_TIMESTAMPNS,
+    Ancillary,
     make_filters,
     make_frame,
     parse_ancillary,
@@ -101,7 +102,8 @@ class SocketCanBus(Bus):
         self, channel: str, bit_rate: int, make_socket: Callable[[], socket.socket] = _make_raw_socket
     ) -> None:
         super().__init__(channel, bit_rate)
-        self.taps = _Taps(self._set_filters)
+        self.taps = _Taps(self._on_taps)
+        self._tapping: tuple[FrameHandler, ...] = ()
         self._make_socket = make_socket
         self.foreign = 0
         self.overflowed = 0
@@ -116,6 +118,7 @@ class SocketCanBus(Bus):
         self._heard: dict[int, FrameHandler] = {}
         self._timer: asyncio.TimerHandle | None = None
         self._reopen_s = FIRST_REOPEN_S
+        self._now_s = self._wall_to_loop_s = 0.0
 
     async def open(self) -> None:
         """Open the interface on the running loop. Raises BusOff where it is down, missing, or has another bit rate."""
@@ -157,14 +160,13 @@ class SocketCanBus(Bus):
 
     def send(self, can_id: int, data: bytes = b"", deadline_s: float = math.inf) -> None:
         """Send one frame or queue it; see :meth:`Bus.send`. Raises ValueError for what no base frame can be."""
-        make_frame(can_id, data)
-        self._queue.send(can_id, data, deadline_s)
+        self._queue.send(can_id, make_frame(can_id, data), deadline_s)
 
-    def _transmit(self, can_id: int, data: bytes) -> bool:
+    def _transmit(self, can_id: int, frame: bytes) -> bool:
         if self._link is None:
             return False
         try:
-            self._link.send(make_frame(can_id, data))
+            self._link.send(frame)
         except OSError as error:
             if error.errno not in _NO_ROOM:
                 self._lose(error)
@@ -179,9 +181,9 @@ class SocketCanBus(Bus):
 
     def _receive(self) -> OSError | None:
         """Take what has come; the error that says that the interface is gone, if it does."""
-        now = self._loop.time()
-        wall_to_loop_s = now - time.time()
         link = self._link
+        self._now_s = self._loop.time()
+        self._wall_to_loop_s = self._now_s - time.time()
         for _ in range(BATCH):
             if link is None or link is not self._link:
                 break  # a handler closed the bus
@@ -191,34 +193,46 @@ class SocketCanBus(Bus):
                 break
             except OSError as error:
                 return error
-            wall_s, lost = parse_ancillary(ancillary)
-            if lost:
-                self._count_overflow(lost)
-            stamp = now if wall_s is None else wall_s + wall_to_loop_s
-            self._take(packet, flags, stamp if now - OLDEST_STAMP_S < stamp < now + OLDEST_STAMP_S else now)
+            self._take(packet, ancillary, flags)
         return None
 
-    def _take(self, packet: bytes, flags: int, stamp: float) -> None:
+    def _take(self, packet: bytes, ancillary: Ancillary, flags: int) -> None:
         frame = parse_frame(packet)
         if frame is None:
             self.foreign += 1
             return
         can_id, data = frame
+        stamp = self._stamp(ancillary)
         if can_id & ERROR_FLAG:
             self.counters.error_frames += 1
             self._follow(can_id, data)
             return
-        for tap in tuple(self.taps):
+        for tap in self._tapping:
             tap(can_id, data, stamp)
-        if flags & _OURS and can_id in self._heard:
+        if flags & _OURS and (flags & _OWN or can_id in self._heard):
+            self._hear(can_id, data, stamp, flags)
+            return
+        if self.down is not None:
+            self._recover()
+        self.counters.received += 1
+        if self.receiver is not None:
+            self.receiver(can_id, data, stamp)
+
+    def _stamp(self, ancillary: Ancillary) -> float:
+        """Loop time at which a frame came; what was lost before it is counted."""
+        wall_s, lost = parse_ancillary(ancillary)
+        if lost:
+            self._count_overflow(lost)
+        if wall_s is None:
+            return self._now_s
+        stamp = wall_s + self._wall_to_loop_s
+        return stamp if abs(stamp - self._now_s) < OLDEST_STAMP_S else self._now_s
+
+    def _hear(self, can_id: int, data: bytes, stamp: float, flags: int) -> None:
+        """A frame of this machine that was on the wire."""
+        if can_id in self._heard:
             self.counters.sent += not flags & _OWN
             self._heard[can_id](can_id, data, stamp)
-        elif not flags & _OWN:
-            if self.down is not None:
-                self._recover()
-            self.counters.received += 1
-            if self.receiver is not None:
-                self.receiver(can_id, data, stamp)
 
     def _count_overflow(self, lost: int) -> None:
         """Count what the receive buffer had no room for; the kernel counts in 32 bits since the socket was made."""
@@ -243,6 +257,10 @@ class SocketCanBus(Bus):
         self.down = None
         self._controller.recovered()
         self._queue.open()
+
+    def _on_taps(self) -> None:
+        self._tapping = tuple(self.taps)
+        self._set_filters()
 
     def _set_filters(self) -> None:
         if self._link is not None:

@@ -26,10 +26,13 @@ SO_TIMESTAMPNS = 35
 ANCILLARY_BYTES = 128
 """Room for a time stamp and an overflow count, each with its header."""
 
+_NO_BASE_FRAME = ~(ID_MASK | RTR_FLAG)
 _FRAME = struct.Struct("=IB3x8s")
 _FILTER = struct.Struct("=II")
 _TIMESPEC = struct.Struct("@ll")
 _COUNT = struct.Struct("=I")
+_TIMESPEC_BYTES = _TIMESPEC.size
+_pack_frame, _unpack_frame, _unpack_timespec = _FRAME.pack, _FRAME.unpack, _TIMESPEC.unpack
 
 Ancillary = list[tuple[int, int, bytes]]
 """What ``recvmsg`` gives beside a frame: level, type and value."""
@@ -45,23 +48,26 @@ def make_frame(can_id: int, data: bytes) -> bytes:
     Raises:
         ValueError: an identifier or a length that a classic base frame cannot have.
     """
-    if can_id & ~(ID_MASK | RTR_FLAG) or len(data) > MAX_DATA_BYTES:
-        raise ValueError(f"no classic base frame: identifier 0x{can_id:X}, {len(data)} data bytes")
-    return _FRAME.pack(can_id, len(data), data)
+    length = len(data)
+    if can_id & _NO_BASE_FRAME or length > MAX_DATA_BYTES:
+        raise ValueError(f"no classic base frame: identifier 0x{can_id:X}, {length} data bytes")
+    return _pack_frame(can_id, length, data)
 
 
 def parse_frame(packet: bytes) -> tuple[int, bytes] | None:
     """Identifier with its flags (ERROR_FLAG, RTR_FLAG) and data; None for anything but a classic base frame."""
     if len(packet) != FRAME_BYTES:
         return None
-    can_id, length, data = _FRAME.unpack(packet)
-    if can_id & EXTENDED_FLAG or length > MAX_DATA_BYTES:
+    can_id, length, data = _unpack_frame(packet)
+    if length > MAX_DATA_BYTES:
+        return None
+    if can_id <= ID_MASK:
+        return can_id, data[:length]
+    if can_id & EXTENDED_FLAG:
         return None
     if can_id & ERROR_FLAG:
         return can_id, data
-    if can_id & ~(ID_MASK | RTR_FLAG):
-        return None
-    return can_id, b"" if can_id & RTR_FLAG else data[:length]
+    return None if can_id & _NO_BASE_FRAME else (can_id, b"")
 
 
 def make_filters(can_ids: Iterable[int]) -> bytes:
@@ -75,11 +81,23 @@ def parse_ancillary(ancillary: Ancillary) -> tuple[float | None, int]:
 
     The kernel tells a count only where frames were lost, and None stands for a time that it did not tell.
     """
-    stamp_s, lost = None, 0
+    if len(ancillary) == 1:  # as a rule: the time, and nothing lost
+        _, kind, value = ancillary[0]
+        if kind == SO_TIMESTAMPNS:
+            return _wall_s(value), 0
+    stamp_s: float | None = None
+    lost = 0
     for _, kind, value in ancillary:
-        if kind == SO_TIMESTAMPNS and len(value) == _TIMESPEC.size:
-            seconds, nanoseconds = _TIMESPEC.unpack(value)
-            stamp_s = seconds + nanoseconds * 1e-9
+        if kind == SO_TIMESTAMPNS:
+            stamp_s = _wall_s(value)
         elif kind == SO_RXQ_OVFL and len(value) == _COUNT.size:
             lost = _COUNT.unpack(value)[0]
     return stamp_s, lost
+
+
+def _wall_s(value: bytes) -> float | None:
+    if len(value) != _TIMESPEC_BYTES:
+        return None
+    seconds, nanoseconds = _unpack_timespec(value)
+    wall_s: float = seconds + nanoseconds * 1e-9
+    return wall_s

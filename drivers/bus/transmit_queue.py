@@ -12,14 +12,15 @@ QUEUE_DEPTH = 64
 RETRY_S = 0.001
 
 _Queued = tuple[int, int, int, bytes, float]
-"""Priority on the wire, order of queueing, identifier with flags, data, deadline."""
+"""Priority on the wire, order of queueing, identifier with flags, what is transmitted, deadline."""
 
 
 class TransmitQueue:
     """Sends at once where it can, else again every :data:`RETRY_S`. It is made closed.
 
     Args:
-        transmit: hands a frame to the interface; False where that has no room or is gone, which closes the queue.
+        transmit: hands a frame to the interface, its identifier and its data or whatever else was queued; False where
+            that has no room or is gone, which closes the queue.
         counters: of the interface; counts what is dropped.
     """
 

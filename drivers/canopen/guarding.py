@@ -76,23 +76,18 @@ class Guard:
         """Send what is due; called by each good control cycle."""
         if not self._armed:
             return
-        self._forgive_pause(now_s)
-        asked_s, guard_time_s = self._asked_s, self.guard_time_s
-        if asked_s is None:
-            if now_s >= self._next_s - EARLY * guard_time_s:
+        pause_s, self._called_s = now_s - self._called_s, now_s
+        if self._asked_s is None:
+            if now_s >= self._next_s - EARLY * self.guard_time_s:
                 self._ask(now_s)
-        elif now_s >= asked_s + self._lost_s:
+            return
+        if pause_s > PAUSE * self.guard_time_s:  # of this program: an answer may wait unread, its time begins anew
+            self._asked_s += pause_s
+        if now_s >= self._asked_s + self._lost_s:
             self.lose(now_s)
-        elif not self._repeated and now_s >= asked_s + REPEAT_AFTER * guard_time_s:
+        elif not self._repeated and now_s >= self._asked_s + REPEAT_AFTER * self.guard_time_s:
             self._repeated = True
             self._request(RTR_FLAG | ERROR_CONTROL_COB_ID + self.node)
-
-    def _forgive_pause(self, now_s: float) -> None:
-        """After a pause of this program an answer may wait unread: its time begins anew."""
-        pause_s = now_s - self._called_s
-        self._called_s = now_s
-        if self._asked_s is not None and pause_s > PAUSE * self.guard_time_s:
-            self._asked_s += pause_s
 
     def _ask(self, now_s: float) -> None:
         self._asked_s = now_s

@@ -72,6 +72,7 @@ class EposDrive(CanopenDevice):
         self.outputs = OutputBits(self.sdo)
         self.on_ready_change: list[Callable[[bool], None]] = []
         self._units = WheelUnits.of(config)
+        self._rpm_per_m_s, self._top_speed_m_s = self._units.rpm_per_m_s, config.max_speed_m_s
         self._travel = Travel(self._units, config.max_speed_m_s)
         self._setup: EposSetup | None = None
         self._target_rpm = 0
@@ -129,11 +130,12 @@ class EposDrive(CanopenDevice):
 
     def command_speed(self, speed_m_s: float) -> None:
         """Take a target speed at the rim for the next :meth:`transmit`; zero unless enabled in the driving mode."""
-        top = self.config.max_speed_m_s
         if self.state is not DriveState.ENABLED or self.mode is not self.driving_mode or speed_m_s != speed_m_s:
             speed_m_s = 0.0
-        self.target_speed_m_s = speed_m_s = min(max(speed_m_s, -top), top)
-        self._target_rpm = round(speed_m_s * self._units.rpm_per_m_s)
+        elif abs(speed_m_s) > self._top_speed_m_s:
+            speed_m_s = math.copysign(self._top_speed_m_s, speed_m_s)
+        self.target_speed_m_s = speed_m_s
+        self._target_rpm = round(speed_m_s * self._rpm_per_m_s)
 
     def transmit(self, deadline_s: float) -> None:
         """Send controlword and target of this cycle."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from itertools import pairwise
 
+import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -264,7 +264,7 @@ def test_an_encoder_that_counts_backward_is_found_out(law: PairedSteerLaw, robot
 
 
 def test_wheels_that_never_rest_are_reported(law: PairedSteerLaw, robot: PairedRobot) -> None:
-    still = dataclasses.replace(robot.measure(), wheel_speed_m_s=(0.1, 0.1, 0.1, 0.1))
+    still = msgspec.structs.replace(robot.measure(), wheel_speed_m_s=(0.1, 0.1, 0.1, 0.1))
     target = steer_target(1, 0.5)
     failures = [law.step(still, target, DT)[1].failure for _ in range(400)]
     assert "do not come to rest" in failures[-1]

@@ -8,6 +8,7 @@ import math
 import pytest
 
 from canhelm.errors import DeviceFault
+from daemon.loops.least_squares import Fits
 from daemon.loops.wheels_and_body import WheelsAndBody, rows_of, wheel_limit_m
 from profiles.loader import load
 from vcan_tests.robot import running_robot
@@ -21,12 +22,12 @@ def drive(
     rows: list[tuple[float, float, float]], twist: tuple[float, float, float], broken: dict[int, float]
 ) -> tuple[int, float] | None:
     """Roll for two seconds as a twist commands; broken wheels roll by this factor of it."""
-    check = WheelsAndBody(LIMIT_M)
+    check, fit = WheelsAndBody(LIMIT_M), Fits(lambda _: rows).at(())
     wheels = 4
     speeds = [sum(a * b for a, b in zip(row, twist, strict=True)) for row in rows[:wheels]]
     for cycle in range(201):
         travel = [broken.get(wheel, 1.0) * speed * cycle * DT for wheel, speed in enumerate(speeds)]
-        found = check.look(rows, travel, speeds, DT)
+        found = check.look(fit, travel, speeds, DT)
         if found:
             return found.index, cycle * DT
     return None
