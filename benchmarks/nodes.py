@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import linear_regression
@@ -10,7 +11,7 @@ from statistics import linear_regression
 from msgspec.structs import replace
 
 from benchmarks.bus_limit import cycle_bits
-from benchmarks.load import Load, load_of
+from benchmarks.load import load_of
 from benchmarks.pictures import COLOURS, panels, saved
 from benchmarks.robots import ROBOT, STANDING
 from benchmarks.section import Options, Section, Table
@@ -73,41 +74,44 @@ def drives_only(count: int, cycle_hz: float) -> Profile:
 
 def run(options: Options, counts: Sequence[int] = COUNTS) -> Section:
     """Drives that stand; every one of them sends its readings and gets its targets in each cycle."""
-    loads: dict[int, Load] = {}
+    costs_us: dict[int, float] = {}
+    bits: dict[int, float] = {}
     for number in range(PASSES):
         for count in counts:
             options.tell(f"{count} nodes, pass {number + 1} of {PASSES}")
             found = load_of(drives_only(count, CYCLE_HZ), STANDING, options.seconds / PASSES, SETTLE_S)
-            loads[count] = min(found, loads.get(count, found), key=lambda load: load.daemon_us)
-    line = fit(list(loads), [found.daemon_us for found in loads.values()])
-    rows = [(count, found.daemon_us, *_on_the_wire(count, found)) for count, found in loads.items()]
-    title = (
-        f"the daemon's time in a cycle: {line.each:.2f} us a node and {line.none:.0f} us, "
-        f"at most {line.residual:.0f} us beside that line; {CYCLE_HZ:g} Hz, virtual time"
-    )
-    heads = ("drives", "daemon [us]", "bits", "least bits", "most bits", "the wire's limit [Hz]")
+            assert found.daemon_us is not None, "the wire carries all readings"
+            costs_us[count] = min(found.daemon_us, costs_us.get(count, math.inf))
+            bits[count] = found.bits
+    line = fit(list(costs_us), list(costs_us.values()))
     figures = {
         "node_us": line.each,
         "without_nodes_us": line.none,
         "residual_us": line.residual,
-        "counts": {str(count): {"daemon_us": found.daemon_us, "bits": found.bits} for count, found in loads.items()},
+        "counts": {str(count): {"daemon_us": cost, "bits": bits[count]} for count, cost in costs_us.items()},
     }
-    return Section("nodes", [Table(title, heads, rows)], figures, [_draw(loads, line, options.out / "nodes.png")])
+    picture = _draw(costs_us, bits, line, options.out / "nodes.png")
+    return Section("nodes", [_table(costs_us, bits, line)], figures, [picture])
 
 
-def _on_the_wire(count: int, found: Load) -> tuple[float, ...]:
-    return (found.bits, *cycle_bits(count), BIT_RATE / found.bits)
+def _table(costs_us: Mapping[int, float], bits: Mapping[int, float], line: Line) -> Table:
+    rows = [(count, cost, bits[count], *cycle_bits(count), BIT_RATE / bits[count]) for count, cost in costs_us.items()]
+    title = (
+        f"the daemon's time in a cycle: {line.each:.2f} us a node and {line.none:.0f} us, "
+        f"at most {line.residual:.0f} us beside that line; {CYCLE_HZ:g} Hz, virtual time"
+    )
+    return Table(title, ("drives", "daemon [us]", "bits", "least bits", "most bits", "the wire's limit [Hz]"), rows)
 
 
-def _draw(loads: dict[int, Load], line: Line, path: Path) -> Path:
-    counts = list(loads)
+def _draw(costs_us: Mapping[int, float], bits: Mapping[int, float], line: Line, path: Path) -> Path:
+    counts = list(costs_us)
     figure, (cost, limit) = panels(1, 2, (12, 4.5))
-    cost.plot(counts, [found.daemon_us for found in loads.values()], "o", color=COLOURS[0])
+    cost.plot(counts, list(costs_us.values()), "o", color=COLOURS[0])
     ends = [0, max(counts)]
     cost.plot(ends, [line.none + line.each * end for end in ends], color="black", linewidth=0.9)
     cost.set(title=f"{line.each:.2f} µs a node", xlabel="drives", ylabel="the daemon's time in a cycle [µs]")
-    limit.plot(counts, [BIT_RATE / found.bits for found in loads.values()], "o-", color=COLOURS[0], label="the wire")
-    by_daemon = [1e6 / found.daemon_us for found in loads.values()]
+    limit.plot(counts, [BIT_RATE / bits[count] for count in counts], "o-", color=COLOURS[0], label="the wire")
+    by_daemon = [1e6 / cost for cost in costs_us.values()]
     limit.plot(counts, by_daemon, "s-", color=COLOURS[1], label="the daemon alone")
     limit.set(title="limits", xlabel="drives", ylabel="cycles a second", xscale="log", yscale="log")
     limit.legend(fontsize="small")

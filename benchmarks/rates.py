@@ -5,19 +5,22 @@ On virtual time the processor takes no time, so only the wire can be too slow; i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
+from pathlib import Path
 
-from benchmarks.bus_limit import cycle_bits
+from benchmarks.bus_limit import Bits, cycle_bits
 from benchmarks.load import Load, load_of
 from benchmarks.nodes import BIT_RATE
+from benchmarks.pictures import COLOURS, panels, saved
 from benchmarks.robots import STRAIGHT, robot_at
 from benchmarks.section import Options, Section, Table
 from canhelm.errors import Timeout
 from daemon.board_bench import RateResult, measure_rate
 from daemon.runtime.clock import run_precise
 
-RATES_HZ = (100.0, 200.0, 500.0, 1000.0)
+RATES_HZ = (100.0, 200.0, 500.0, 700.0, 850.0, 1000.0)
 STEP_HZ, LOWEST_HZ, HIGHEST_HZ = 10, 100, 1000
 """The grid on which the highest rate is looked for on virtual time."""
 REAL_RATES_HZ = (100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0, 900.0)
@@ -30,23 +33,27 @@ DRIVES, ENCODERS = 4, 2
 def run(options: Options) -> Section:
     """Costs at some rates, the wire's limit, and the highest rate of this machine in real time."""
     loads = {hz: _load_at(hz, options.seconds, options.tell) for hz in RATES_HZ}
-    highest = highest_kept(lambda hz: _is_kept(_load_at(hz, options.seconds, options.tell)))
+    in_time = highest_kept(lambda hz: _is_in_time(_load_at(hz, options.seconds, options.tell)))
+    complete = highest_kept(lambda hz: _is_complete(_load_at(hz, options.seconds, options.tell)))
     real = kept_in_real_time("simulated", options.seconds, options.tell)
-    least, most = cycle_bits(DRIVES, ENCODERS)
+    bits = cycle_bits(DRIVES, ENCODERS)
     title = (
-        f"{DRIVES} drives and {ENCODERS} encoders: {least} to {most} bits in a cycle, {BIT_RATE / most:.0f} to "
-        f"{BIT_RATE / least:.0f} Hz fill the wire; {highest or 0} Hz is the highest rate with less than "
-        f"{ALLOWED_LATE:.1%} late cycles, on virtual time"
+        f"{DRIVES} drives and {ENCODERS} encoders: {bits.least} to {bits.most} bits in a cycle, "
+        f"{BIT_RATE / bits.most:.0f} to {BIT_RATE / bits.least:.0f} Hz fill the wire; on virtual time less than "
+        f"{ALLOWED_LATE:.1%} of the cycles are late up to {in_time or 0} Hz, and as few lack a reading up to "
+        f"{complete or 0} Hz"
     )
     costs = Table(title, COST_HEADS, [cost_row(hz, found) for hz, found in loads.items()])
     figures = {
-        "cycle_bits": {"least": least, "most": most},
-        "highest_virtual_hz": highest,
+        "cycle_bits": bits._asdict(),
+        "highest_in_time_hz": in_time,
+        "highest_complete_hz": complete,
         "loads": {f"{hz:g}": asdict(found) if found else None for hz, found in loads.items()},
         "real_time": [asdict(result) for result in real],
         "highest_real_hz": highest_of(real),
     }
-    return Section("rates", [costs, real_table("simulated network in the same process", real)], figures)
+    tables = [costs, real_table("simulated network in the same process", real)]
+    return Section("rates", tables, figures, [_draw(loads, bits, options.out / "rates.png")])
 
 
 COST_HEADS = ("rate [Hz]", "daemon [us a cycle]", "of a core", "wire busy", "late", "incomplete", "frames lost")
@@ -56,8 +63,9 @@ def cost_row(hz: float, found: Load | None) -> tuple[str | float | None, ...]:
     """One rate; where the wire was too full to boot, only the rate."""
     if found is None:
         return (hz, *[None] * (len(COST_HEADS) - 1))
-    shares = (found.daemon_us * hz / 1e6, found.wire_share, found.late / found.cycles, found.incomplete / found.cycles)
-    return (hz, found.daemon_us, *(f"{share:.2%}" for share in shares), found.lost)
+    core = None if found.daemon_us is None else f"{found.daemon_us * hz / 1e6:.2%}"
+    shares = (found.wire_share, found.late / found.cycles, found.incomplete / found.cycles)
+    return (hz, found.daemon_us, core, *(f"{share:.2%}" for share in shares), found.lost)
 
 
 def _load_at(hz: float, seconds: float, tell: Callable[[str], None]) -> Load | None:
@@ -69,8 +77,12 @@ def _load_at(hz: float, seconds: float, tell: Callable[[str], None]) -> Load | N
         return None
 
 
-def _is_kept(found: Load | None) -> bool:
+def _is_in_time(found: Load | None) -> bool:
     return found is not None and found.late <= ALLOWED_LATE * found.cycles and found.lost == 0
+
+
+def _is_complete(found: Load | None) -> bool:
+    return found is not None and _is_in_time(found) and found.incomplete <= ALLOWED_LATE * found.cycles
 
 
 def highest_kept(keeps: Callable[[float], bool]) -> int | None:
@@ -81,6 +93,22 @@ def highest_kept(keeps: Callable[[float], bool]) -> int | None:
         middle = (low + high) // 2
         low, high = (middle, high) if keeps(rates[middle]) else (low, middle)
     return rates[low] if low >= 0 else None
+
+
+def _draw(loads: Mapping[float, Load | None], bits: Bits, path: Path) -> Path:
+    figure, (axes,) = panels(1, 1, (8, 4.5))
+    booted = {hz: found for hz, found in loads.items() if found is not None}
+    shares = {
+        "the wire is busy": [found.wire_share for found in booted.values()],
+        "a core, by the daemon": [(found.daemon_us or math.nan) * hz / 1e6 for hz, found in booted.items()],
+        "cycles without some reading": [found.incomplete / found.cycles for found in booted.values()],
+    }
+    for colour, (words, values) in zip(COLOURS, shares.items(), strict=False):
+        axes.plot(list(booted), [100.0 * value for value in values], "o-", color=colour, label=words)
+    axes.axvspan(BIT_RATE / bits.most, BIT_RATE / bits.least, alpha=0.2, color="black", label="the wire's limit")
+    axes.set(title="MAX2D at 1 Mbit/s", xlabel="cycles a second", ylabel="share [%]", xlim=(0.0, HIGHEST_HZ))
+    axes.legend(fontsize="small")
+    return saved(figure, path)
 
 
 def kept_in_real_time(bus: str, seconds: float, tell: Callable[[str], None]) -> list[RateResult]:

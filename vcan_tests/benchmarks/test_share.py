@@ -16,4 +16,5 @@ def test_each_tick_and_each_frame_that_the_daemon_is_given_counts_once(monkeypat
     monkeypatch.setattr(share, "perf_counter", itertools.count().__next__)  # every timed call takes 1 s
     readings = 2
     found = load_of(drives_only(2, 50.0), STANDING, 10.0, 0.5)
-    assert found.daemon_us / 1e6 == pytest.approx(1 + readings, abs=0.02)
+    assert found.daemon_us is not None
+    assert found.daemon_us / 1e6 == pytest.approx(1 + readings, abs=0.1)
