@@ -75,8 +75,8 @@ class FlightRecorder:
         self._latched = False
         self._encode = msgspec.msgpack.Encoder(enc_hook=str).encode
 
-    def take_frame(self, packed: bytes, time_s: float) -> None:
-        """A frame of the bus, at its loop time."""
+    def take_frames(self, packed: bytes | bytearray, time_s: float) -> None:
+        """Frames of the bus that have come until a loop time."""
         if time_s >= self._cut_s:
             self._cut(time_s)
         self._newest.frames += packed

@@ -42,7 +42,6 @@ class CandumpRecorder:
         trouble: what faults make of a simulated robot's disk.
 
     Attributes:
-        frames: frames seen.
         errors: attempts to write that failed.
     """
 
@@ -55,7 +54,6 @@ class CandumpRecorder:
         limit_bytes: int = LIMIT_BYTES,
         trouble: DiskTrouble | None = None,
     ) -> None:
-        self.frames = 0
         self.errors = 0
         self._loop = asyncio.get_running_loop()
         self._epoch_s = epoch_s()
@@ -64,7 +62,7 @@ class CandumpRecorder:
         self._files = LogFiles(path, robot, limit_bytes, sync=sync, trouble=self._trouble)
         self._bus = bus
         self._events = events
-        self._lost = 0
+        self._taken = self._lost = 0
         self._disk: Disk | None = None
         self._pending = bytearray()
         self._timer: asyncio.TimerHandle | None = None
@@ -74,6 +72,11 @@ class CandumpRecorder:
     def path(self) -> Path:
         """The log that is written to now, once it is started."""
         return self._files.path
+
+    @property
+    def frames(self) -> int:
+        """Frames seen."""
+        return self._taken + len(self._pending) // PACKED_BYTES
 
     @property
     def lost(self) -> int:
@@ -113,8 +116,7 @@ class CandumpRecorder:
         }
 
     def _record(self, can_id: int, data: bytes, timestamp_s: float) -> None:
-        self.frames += 1
-        self._pending += pack_frame(timestamp_s, can_id, data)
+        self._pending += pack_frame(timestamp_s, can_id, len(data), data)
         if self._timer is None:
             period_s = RETRY_PERIOD_S if self._failing else WRITE_PERIOD_S
             self._timer = self._loop.call_later(period_s, self._write)
@@ -125,6 +127,7 @@ class CandumpRecorder:
             self._timer = None
         assert self._disk is not None
         packed, self._pending = self._pending, bytearray()
+        self._taken += len(packed) // PACKED_BYTES
         if not self._disk.do(partial(self._write_lines, packed, self._loop.time()), len(packed)):
             self._lost += len(packed) // PACKED_BYTES
         if self._failing and not self._files.failing:

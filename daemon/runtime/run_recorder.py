@@ -42,6 +42,8 @@ from profiles.schema import Profile
 
 LOGGER = logging.getLogger("canhelm.runs")
 FLUSH_PERIOD_S = 1.0
+WAITING_BYTES = 10_000
+"""Frames that may wait for the end of a control cycle; where there is none, so many wait for more."""
 ROOM = "make room there, or: canhelm runs delete NUMBER"
 ELSEWHERE = "keep them in a folder that can be written: canhelm run --runs DIR"
 
@@ -95,6 +97,7 @@ class RunRecorder:
         self._flight = FlightRecorder(self._supervisor, self._store.run_bytes, self._keep_fault)
         self._supervisor.on_motion.append(self._on_motion)
         self._supervisor.observers.append(self._on_cycle)
+        self._frames = bytearray()
         self._bus.taps.append(self._on_frame)
 
     def close(self) -> None:
@@ -104,6 +107,7 @@ class RunRecorder:
         self._supervisor.on_motion.remove(self._on_motion)
         self._supervisor.observers.remove(self._on_cycle)
         self._bus.taps.remove(self._on_frame)
+        self._hand_out()
         for recording in list(self._recordings):
             self._end(recording)
         self._disk.close()
@@ -224,6 +228,7 @@ class RunRecorder:
                 self._begin(recording.motion, recording.part + 1)
 
     def _end_closed(self) -> None:
+        self._hand_out()
         for recording in list(self._recordings):
             if recording.motion.closed.is_set():
                 self._end(recording)
@@ -236,10 +241,17 @@ class RunRecorder:
             self._flush(recording)
 
     def _on_frame(self, can_id: int, data: bytes, timestamp_s: float) -> None:
-        packed = pack_frame(timestamp_s, can_id, data)
-        for recording in self._recordings:
-            recording.frames += packed
-        self._flight.take_frame(packed, timestamp_s)
+        self._frames += pack_frame(timestamp_s, can_id, len(data), data)
+        if len(self._frames) > WAITING_BYTES:
+            self._hand_out()
+
+    def _hand_out(self) -> None:
+        """Give the frames since the last time to all who keep them."""
+        if self._frames:
+            for recording in self._recordings:
+                recording.frames += self._frames
+            self._flight.take_frames(self._frames, self._loop.time())
+            self._frames.clear()
 
     # --- faults ------------------------------------------------------------------------------------------------
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import struct
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from drivers.bus.contract import ID_MASK, RTR_FLAG
@@ -17,9 +18,13 @@ _LINE = re.compile(
 
 
 _PACKED = struct.Struct("=dIB8s")
+_PACKED_HEAD = struct.Struct("=dIB8x")
 PACKED_BYTES = _PACKED.size
 """Of one packed frame."""
-_pack = _PACKED.pack
+_DATA_AT = PACKED_BYTES - 8
+pack_frame = _PACKED.pack
+"""A frame as it is gathered where there is no time for a line: time stamp, identifier, length and data.
+:func:`make_lines` makes lines of many."""
 
 
 class LogFrame(NamedTuple):
@@ -40,12 +45,7 @@ class LogFrame(NamedTuple):
 
 def make_line(timestamp_s: float, interface: str, can_id: int, data: bytes) -> str:
     """One line without its line end; the time in full microseconds."""
-    return make_lines(pack_frame(timestamp_s, can_id, data), 0.0, interface)[:-1].decode()
-
-
-def pack_frame(timestamp_s: float, can_id: int, data: bytes) -> bytes:
-    """A frame as it is gathered where there is no time for a line: :func:`make_lines` makes lines of many."""
-    return _pack(timestamp_s, can_id, len(data), data)
+    return make_lines(pack_frame(timestamp_s, can_id, len(data), data), 0.0, interface)[:-1].decode()
 
 
 def make_lines(packed: bytes | bytearray, epoch_s: float, interface: str) -> bytes:
@@ -58,12 +58,21 @@ def make_lines(packed: bytes | bytearray, epoch_s: float, interface: str) -> byt
     """
     heads: dict[int, str] = {}
     lines: list[str] = []
-    for timestamp_s, can_id, length, data in _PACKED.iter_unpack(packed):
+    digits, place = packed.hex().upper(), 2 * _DATA_AT
+    for timestamp_s, can_id, length in _PACKED_HEAD.iter_unpack(packed):
         head = heads.get(can_id)
         if head is None:
             head = heads[can_id] = f"{interface} {can_id & ID_MASK:03X}#{'R' if can_id & RTR_FLAG else ''}"
-        lines.append(f"({epoch_s + timestamp_s:017.6f}) {head}{data[:length].hex().upper()}\n")
+        time_us = f"{round((epoch_s + timestamp_s) * 1e6):016d}"
+        lines.append(f"({time_us[:-6]}.{time_us[-6:]}) {head}{digits[place : place + 2 * length]}\n")
+        place += 2 * PACKED_BYTES
     return "".join(lines).encode()
+
+
+def unpack_frames(packed: bytes | bytearray) -> Iterator[tuple[float, int, bytes]]:
+    """Time stamp, identifier and data of each packed frame."""
+    for timestamp_s, can_id, length, data in _PACKED.iter_unpack(packed):
+        yield timestamp_s, can_id, data[:length]
 
 
 def parse_line(line: str) -> LogFrame | None:

@@ -132,7 +132,7 @@ async def test_a_slice_larger_than_all_room_is_let_go(tmp_path: Path) -> None:
     async with running_robot() as robot:
         flight = FlightRecorder(robot.app.supervisor, 10, kept.extend)
         for second in range(3):
-            flight.take_frame(b"x" * 100, float(second))
+            flight.take_frames(b"x" * 100, float(second))
     assert kept == []
 
 
