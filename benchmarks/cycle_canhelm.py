@@ -15,7 +15,7 @@ from benchmarks.cycle_robot import SocketRobot
 from daemon.runs.store import RunStore
 from daemon.runtime.cycle import Cycle
 from daemon.runtime.paired_steer_vehicle import PairedSteerVehicle
-from daemon.runtime.recorder import CandumpRecorder
+from daemon.runtime.recorder import BusRecorder
 from daemon.runtime.run_recorder import RunRecorder
 from daemon.runtime.supervisor import Supervisor
 from daemon.runtime.vehicle import VehicleState
@@ -82,10 +82,10 @@ class CanhelmCycle:
         self.supervisor = Supervisor(self.master, self._devices, vehicle, PERIOD_S)
         self.cycle = Cycle(self.master, self._devices, PERIOD_S, self.supervisor.step, self._make_pace)
         self.cycle.on_good = self._on_good
-        self.recorder: CandumpRecorder | None = None
+        self.recorder: BusRecorder | None = None
         self.runs: RunRecorder | None = None
         if recording:
-            self.recorder = CandumpRecorder(self.bus, self._folder / "all.log", profile.name, self.supervisor.log)
+            self.recorder = BusRecorder(self.bus, self._folder / "all.log", profile.name, self.supervisor.log)
             self.recorder.start()
             store = RunStore(self._folder / "runs")
             self.runs = RunRecorder(store, self.supervisor, self.bus, profile, "socketcan:bench0")

@@ -15,7 +15,8 @@ from daemon.runs.store import RunStore
 from daemon.runtime.commands import Commands
 from daemon.runtime.cycle import Cycle
 from daemon.runtime.localising import Localiser
-from daemon.runtime.recorder import LIMIT_BYTES, CandumpRecorder
+from daemon.runtime.log_forms import CANDUMP, LogForm
+from daemon.runtime.recorder import LIMIT_BYTES, BusRecorder
 from daemon.runtime.run_recorder import RunRecorder
 from daemon.runtime.service import Service
 from daemon.runtime.supervisor import Supervisor
@@ -80,8 +81,9 @@ class App:
         profile: the robot.
         bus: the SPEC of :func:`daemon.wires.make_wire`.
         socket: path of the API's socket; None for a daemon without one (demo, tests).
-        record: folder or file for a candump log; None for none.
+        record: folder or file for a log of the bus; None for none.
         record_bytes: what the logs of that folder may take.
+        record_form: how they are written.
         seed: of everything random in the simulated network.
         powered: whether the simulated nodes have power from the start.
         gateway: where other CANopen tools are served; None for nowhere.
@@ -102,6 +104,7 @@ class App:
         socket: Path | None = None,
         record: Path | None = None,
         record_bytes: int = LIMIT_BYTES,
+        record_form: LogForm = CANDUMP,
         seed: int = 0,
         powered: bool = True,
         gateway: GatewayAccess | None = None,
@@ -122,8 +125,8 @@ class App:
         self._powered = powered
         self._inherited = inherited or {}
         self._connecting: asyncio.Task[None] | None = None
-        self._record, self._record_bytes = record, record_bytes
-        self.recorder: CandumpRecorder | None = None
+        self._record, self._record_bytes, self._record_form = record, record_bytes, record_form
+        self.recorder: BusRecorder | None = None
         self.master = Master(self.bus, profile.network)
         self.devices = Devices(self.master, profile, wire.bricks)
         self.vehicle = make_vehicle(profile, self.devices)
@@ -216,8 +219,14 @@ class App:
         if self.gateway is not None:
             await self.gateway.start()
         if self._record is not None:
-            self.recorder = CandumpRecorder(
-                self.bus, self._record, self.profile.name, self.supervisor.log, self._record_bytes, self._disk
+            self.recorder = BusRecorder(
+                self.bus,
+                self._record,
+                self.profile.name,
+                self.supervisor.log,
+                self._record_bytes,
+                self._record_form,
+                self._disk,
             )
             self.recorder.start()
             self.service.recorder = self.recorder

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Coroutine, Iterable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
@@ -38,6 +38,7 @@ def run(
     socket: Path | None = None,
     record: str | None = None,
     record_mb: int = 1000,
+    record_format: Literal["candump", "mcap"] = "candump",
     unpowered: Annotated[bool, Parameter(negative=())] = False,
     gateway: Path | None = None,
     gateway_tcp: int | None = None,
@@ -67,8 +68,9 @@ def run(
         virtual_time: Refused here: clients live in real time. `canhelm demo --virtual-time` has it.
         seed: Seed of everything random in the simulated network.
         socket: Where to listen; the default is the robot's socket in the runtime folder.
-        record: Folder or file for a candump log.
+        record: Folder or file (`.log`, `.mcap`) for everything that goes over the bus.
         record_mb: What the logs of that folder may take; the oldest are deleted.
+        record_format: Text as candump writes it, or MCAP for Foxglove, PlotJuggler and Rerun.
         unpowered: Simulated drives have no power until `canhelm sim power all on`.
         gateway: Where other CANopen tools connect (CiA 309-3); the default is beside the socket, as NAME.309.sock.
         gateway_tcp: Port on the loopback interface for such tools as well, to read only.
@@ -91,11 +93,13 @@ def run(
     from daemon.app import App, GatewayAccess
     from daemon.runtime.activation import inherited_sockets
     from daemon.runtime.clock import run_patient
+    from daemon.runtime.log_forms import FORMS
     from profiles.faults import load_faults
     from profiles.loader import load
 
     chosen = _bus(bus, simulate=simulate)
-    _refuse_senseless(chosen, unpowered=unpowered, record=record, record_mb=record_mb, virtual_time=virtual_time)
+    _refuse_senseless(chosen, unpowered=unpowered, virtual_time=virtual_time)
+    _refuse_recording(record, record_mb, record_format)
     loaded = load(profile) if profile else None
     robot = loaded.profile if loaded else _unknown(chosen, bit_rate)
     for option, wanted in (("--miswire", miswire), ("--faults", faults)):
@@ -117,6 +121,7 @@ def run(
         socket=path,
         record=Path(record) if record else None,
         record_bytes=record_mb * 1_000_000,
+        record_form=FORMS[record_format],
         seed=seed,
         powered=not unpowered,
         gateway=GatewayAccess(gateway or path.with_suffix(protocol.GATEWAY_SUFFIX), gateway_tcp, gateway_write),
@@ -202,16 +207,23 @@ async def _live(make_app: Callable[[Profile], App], source: str | None, robot: P
     return farewell
 
 
-def _refuse_senseless(bus: str, *, unpowered: bool, record: str | None, record_mb: int, virtual_time: bool) -> None:
+def _refuse_recording(record: str | None, megabytes: int, form: str) -> None:
+    """Raise UsageError for options of the recording that make no sense, or not together."""
+    if record == "":
+        raise UsageError("--record is empty", remedy="name a folder or a file, as --record logs")
+    if megabytes < 1:
+        raise UsageError("--record-mb is below 1", value=megabytes, remedy="give megabytes, or leave --record out")
+    if form == "mcap" and record is not None and record.endswith(".log"):
+        remedy = "name a folder, or a file that ends in .mcap"
+        raise UsageError(f"--record {record} is no name of an MCAP file", value=record, remedy=remedy)
+
+
+def _refuse_senseless(bus: str, *, unpowered: bool, virtual_time: bool) -> None:
     """Raise UsageError for options that make no sense, or not together."""
     if unpowered and not simulates(bus):
         raise UsageError(
             f"--unpowered is for simulated drives, and {bus} is real", remedy="leave it out; switch its power off"
         )
-    if record == "":
-        raise UsageError("--record is empty", remedy="name a folder or a file, as --record logs")
-    if record_mb < 1:
-        raise UsageError("--record-mb is below 1", value=record_mb, remedy="give megabytes, or leave --record out")
     if virtual_time:
         raise UsageError(
             "virtual time is for demos, campaigns and tests: clients of a socket live in real time",

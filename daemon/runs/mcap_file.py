@@ -14,10 +14,10 @@ import msgspec
 
 from canhelm import __version__
 from canhelm.errors import CanhelmError, ConfigError, UsageError
+from daemon.runs.mcap_bytes import frame_content
 from daemon.runs.store import DRIVES, EVENTS, FACTS, FRAMES, PROFILE, RECORDS, TERMS, Run
 from daemon.runs.table import read_table
 from drivers.bus.candump import LogFrame, parse_line
-from drivers.bus.contract import ID_MASK, RTR_FLAG
 
 JSON_LINES: Final = {"/terms": TERMS, "/records": RECORDS, "/events": EVENTS}
 """Files of JSON lines by the names of their channels."""
@@ -135,15 +135,7 @@ def _messages(run: Run) -> Iterator[Message]:
 
 
 def _frame(frame: LogFrame) -> Message:
-    can_id = frame.can_id & ID_MASK
-    content = {
-        "interface": frame.interface,
-        "id": can_id,
-        "id_hex": f"{can_id:03X}",
-        "remote": bool(frame.can_id & RTR_FLAG),
-        "data_hex": frame.data.hex().upper(),
-    }
-    return FRAMES_CHANNEL, frame.timestamp_s, content
+    return FRAMES_CHANNEL, frame.timestamp_s, frame_content(frame.interface, frame.can_id, frame.data)
 
 
 def _cycles(run: Run) -> Iterator[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""The plain record of everything that went over the bus, as a candump log."""
+"""The plain record of everything that goes over the bus."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from daemon.runtime.clock import VirtualTimeLoop
 from daemon.runtime.disk import Disk
 from daemon.runtime.events import EventLog
 from daemon.runtime.log_files import LogFiles
+from daemon.runtime.log_forms import CANDUMP, FORMS, LogForm
 from daemon.runtime.time_of_day import epoch_s
-from drivers.bus.candump import PACKED_BYTES, make_lines, pack_frame
+from drivers.bus.candump import PACKED_BYTES, pack_frame
 from drivers.bus.contract import Bus
 from drivers.simulated.disk_trouble import DiskTrouble
 
@@ -24,8 +25,8 @@ LIMIT_BYTES = 1_000_000_000
 """What all logs of a folder may take, unless told otherwise."""
 
 
-class CandumpRecorder:
-    """Writes every frame of a bus to a candump log: ten times a second, by a thread, and when it is closed.
+class BusRecorder:
+    """Writes every frame of a bus to a log: ten times a second, by a thread, and when it is closed.
 
     A disk that is full, fails or is slow stops nothing else: it is an event, what could not be written is kept up to
     4 MB and tried again once a second, and only frames beyond that are lost and counted.
@@ -39,6 +40,7 @@ class CandumpRecorder:
         robot: the robot's name.
         events: where a disk that fails is told.
         limit_bytes: what the logs of a folder may take.
+        form: of the log, unless the suffix of a file says it.
         trouble: what faults make of a simulated robot's disk.
 
     Attributes:
@@ -52,6 +54,7 @@ class CandumpRecorder:
         robot: str,
         events: EventLog,
         limit_bytes: int = LIMIT_BYTES,
+        form: LogForm = CANDUMP,
         trouble: DiskTrouble | None = None,
     ) -> None:
         self.errors = 0
@@ -59,7 +62,8 @@ class CandumpRecorder:
         self._epoch_s = epoch_s()
         self._trouble = trouble or DiskTrouble()
         sync = not isinstance(self._loop, VirtualTimeLoop)
-        self._files = LogFiles(path, robot, limit_bytes, sync=sync, trouble=self._trouble)
+        self._form = next((each for each in FORMS.values() if path.suffix == each.suffix), form)
+        self._files = LogFiles(path, self._form, robot, limit_bytes, sync=sync, trouble=self._trouble)
         self._bus = bus
         self._events = events
         self._taken = self._lost = 0
@@ -128,15 +132,16 @@ class CandumpRecorder:
         assert self._disk is not None
         packed, self._pending = self._pending, bytearray()
         self._taken += len(packed) // PACKED_BYTES
-        if not self._disk.do(partial(self._write_lines, packed, self._loop.time()), len(packed)):
+        if not self._disk.do(partial(self._write_out, packed, self._loop.time()), len(packed)):
             self._lost += len(packed) // PACKED_BYTES
         if self._failing and not self._files.failing:
             self._failing = False
             self._events.add("info", "recording", f"goes on in {self.path}; {self.lost} frames are missing in all")
 
-    def _write_lines(self, packed: bytearray, now_s: float) -> None:
+    def _write_out(self, packed: bytearray, now_s: float) -> None:
         """In the disk's thread."""
-        self._files.write(make_lines(packed, self._epoch_s, self._bus.name), now_s)
+        told = self._form.make(packed, self._epoch_s, self._bus.name)
+        self._files.write(told, len(packed) // PACKED_BYTES, now_s)
 
     def _on_failure(self, error: OSError) -> None:
         self.errors += 1

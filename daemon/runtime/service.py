@@ -12,7 +12,7 @@ from daemon.runtime.clock import stood_still_s
 from daemon.runtime.commands import Commands
 from daemon.runtime.cycle import Cycle
 from daemon.runtime.localising import Localiser
-from daemon.runtime.recorder import CandumpRecorder
+from daemon.runtime.recorder import BusRecorder
 from daemon.runtime.run_recorder import RunRecorder
 from daemon.runtime.supervisor import Supervisor
 from drivers.bus.contract import Bus
@@ -48,7 +48,7 @@ class Service:
         profile_file: Path | None = None,
     ) -> None:
         self.robot = robot
-        self.recorder: CandumpRecorder | None = None
+        self.recorder: BusRecorder | None = None
         self.runs: RunRecorder | None = None
         self.localiser: Localiser | None = None
         self.found: list[dict[str, Any]] = []

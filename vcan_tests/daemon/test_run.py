@@ -192,6 +192,11 @@ async def test_nothing_listens_on_a_network_unless_it_is_told_to(
         await app.close()
 
 
+def test_a_text_log_is_no_mcap_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*SIMULATED, "--record", str(tmp_path / "bus.log"), "--record-format", "mcap"]) == 2
+    assert "a file that ends in .mcap" in capsys.readouterr().err
+
+
 def test_an_empty_record_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*SIMULATED, "--record", ""]) == 2
     assert "--record is empty" in capsys.readouterr().err
