@@ -9,7 +9,12 @@ from enum import Enum
 
 
 class DataType(Enum):
-    """CANopen data types (CiA 301, 7.4): struct code and size in bits, 0 where the length varies."""
+    """CANopen data types (CiA 301, 7.4).
+
+    Attributes:
+        code: format character of :mod:`struct`, empty or blank for types without a fixed length.
+        bits: size, 0 where the length varies.
+    """
 
     U8 = ("B", 8)
     U16 = ("H", 16)
@@ -21,26 +26,22 @@ class DataType(Enum):
     VISIBLE_STRING = ("", 0)
     DOMAIN = (" ", 0)
 
-    @property
-    def code(self) -> str:
-        """Format character of :mod:`struct`, empty or blank for types without a fixed length."""
-        return str(self.value[0])
-
-    @property
-    def bits(self) -> int:
-        """Size in bits, 0 where the length varies."""
-        return int(self.value[1])
+    def __init__(self, code: str, bits: int) -> None:
+        self.code = code
+        self.bits = bits
+        self._struct = struct.Struct(f"<{code}" if bits else "")
 
     def pack(self, value: int | str | bytes) -> bytes:
         """Little-endian bytes of a value. Raises struct.error or TypeError for a value that does not fit."""
         if self.bits:
-            return struct.pack("<" + self.code, value)
+            return self._struct.pack(value)
         return value.encode("ascii") if isinstance(value, str) else bytes(value)
 
     def unpack(self, data: bytes) -> int | str | bytes:
         """The value of little-endian bytes. Raises struct.error where the length is wrong."""
         if self.bits:
-            return int(struct.unpack("<" + self.code, data)[0])
+            number: int = self._struct.unpack(data)[0]
+            return number
         return data.decode("latin-1") if self is DataType.VISIBLE_STRING else data
 
 

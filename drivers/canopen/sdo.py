@@ -263,8 +263,9 @@ class SdoClient:
         loop = asyncio.get_running_loop()
         waiter: asyncio.Future[SdoAnswer] = loop.create_future()
         self._waiter, self._expected = waiter, (kind, toggle)
-        timer = loop.call_later(timeout_s, self._fail, waiter, f"did not answer within {timeout_s * 1e3:.0f} ms")
-        self._send(REQUEST_COB_ID + self.node, request, loop.time() + timeout_s)
+        deadline_s = loop.time() + timeout_s
+        timer = loop.call_at(deadline_s, self._expire, waiter, timeout_s)
+        self._send(REQUEST_COB_ID + self.node, request, deadline_s)
         try:
             answer = await waiter
         finally:
@@ -301,6 +302,9 @@ class SdoClient:
             self._fail(self._waiter, reason)
         if self._channel is not None:
             self._channel.end(reason)
+
+    def _expire(self, waiter: asyncio.Future[SdoAnswer], timeout_s: float) -> None:
+        self._fail(waiter, f"did not answer within {timeout_s * 1e3:.0f} ms")
 
     def _fail(self, waiter: asyncio.Future[SdoAnswer], reason: str) -> None:
         if not waiter.done():

@@ -26,6 +26,10 @@ class AnswerKind(IntEnum):
     ABORT = 4
 
 
+_KINDS = tuple(AnswerKind)
+_NO_ANSWER = len(_KINDS) << 5
+
+
 class SdoAnswer(NamedTuple):
     """One answer of an SDO server.
 
@@ -76,18 +80,18 @@ def make_abort(index: int, sub: int, code: int) -> bytes:
 
 def parse_answer(data: bytes) -> SdoAnswer | None:
     """The answer in 8 bytes from an SDO server, or None where it is none."""
-    if len(data) != 8 or data[0] >> 5 > AnswerKind.ABORT:
+    if len(data) != 8 or data[0] >= _NO_ANSWER:
         return None
-    kind, toggle = AnswerKind(data[0] >> 5), data[0] >> 4 & 1
+    kind, toggle = _KINDS[data[0] >> 5], data[0] >> 4 & 1
+    if kind is AnswerKind.UPLOAD:
+        command, index, sub, value = _INITIATE.unpack(data)
+        expedited, sized = bool(command & 2), bool(command & 1)
+        if expedited and sized:
+            value = value[: 4 - (command >> 2 & 3)]
+        return SdoAnswer(kind, (index, sub), 0, value, expedited, sized)
     if kind is AnswerKind.UPLOAD_SEGMENT:
         return SdoAnswer(kind, toggle=toggle, data=data[1 : 8 - (data[0] >> 1 & 7)], last=bool(data[0] & 1))
     if kind is AnswerKind.DOWNLOAD_SEGMENT:
         return SdoAnswer(kind, toggle=toggle)
-    command, index, sub, code = _ABORT.unpack(data)
-    if kind is AnswerKind.ABORT:
-        return SdoAnswer(kind, (index, sub), code=code)
-    if kind is AnswerKind.DOWNLOAD:
-        return SdoAnswer(kind, (index, sub))
-    expedited, sized = bool(command & 2), bool(command & 1)
-    value = data[4 : 8 - (command >> 2 & 3)] if expedited and sized else data[4:]
-    return SdoAnswer(kind, (index, sub), data=value, last=expedited, sized=sized)
+    _, index, sub, code = _ABORT.unpack(data)
+    return SdoAnswer(kind, (index, sub), code=code if kind is AnswerKind.ABORT else 0)
