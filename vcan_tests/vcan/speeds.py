@@ -15,6 +15,7 @@ from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from benchmarks.jitter import PERIOD_S, PRODUCERS, Producer, period_errors_us, ticks_in
 from benchmarks.latency import latencies_s
@@ -40,7 +41,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def measure(folder: Path, seconds: float) -> dict[str, object]:
+def measure(folder: Path, seconds: float) -> dict[str, Any]:
     """Everything, one after the other, with times in microseconds."""
     producers = {**PRODUCERS, "the kernel's broadcast manager": by_kernel}
     jitter = {
