@@ -133,17 +133,30 @@ def test_no_line_of_text_is_taken_for_a_request(manual: dict[str, str]) -> None:
     assert requests == {".TH", ".SH", ".PP", ".TP", ".B", ".BR"}
 
 
-def test_the_completions_are_there_under_the_names_that_shells_look_for() -> None:
-    assert {name: "velocity" in text for name, text in completions().items()} == {
+@pytest.fixture(scope="module")
+def scripts() -> dict[str, str]:
+    return completions()
+
+
+def test_the_completions_are_there_under_the_names_that_shells_look_for(scripts: dict[str, str]) -> None:
+    assert {name: "velocity" in text for name, text in scripts.items()} == {
         "canhelm": True,
         "_canhelm": True,
         "canhelm.fish": True,
     }
 
 
-def test_the_shell_can_read_its_completions() -> None:
-    checked = subprocess.run(["bash", "-n"], input=completions()["canhelm"], capture_output=True, text=True)
+def test_the_shell_can_read_its_completions(scripts: dict[str, str]) -> None:
+    checked = subprocess.run(["bash", "-n"], input=scripts["canhelm"], capture_output=True, text=True)
     assert (checked.returncode, checked.stderr) == (0, "")
+
+
+def test_the_tab_key_needs_no_program(scripts: dict[str, str]) -> None:
+    tab = 'COMP_WORDS=(canhelm motor vel); COMP_CWORD=2; _canhelm; echo "${COMPREPLY[@]}"'
+    typed = subprocess.run(
+        ["bash", "--norc"], input=f"PATH=\n{scripts['canhelm']}\n{tab}\n", capture_output=True, text=True
+    )
+    assert (typed.stdout, typed.stderr) == ("velocity\n", "")
 
 
 # -- writing ----------------------------------------------------------------------------------------------------------

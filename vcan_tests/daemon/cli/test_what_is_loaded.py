@@ -46,5 +46,10 @@ def test_the_commands_of_every_day_load_the_parser_and_no_other_library(server: 
     assert packages - sys.stdlib_module_names - {"canhelm", "daemon"} == PARSER
 
 
+def test_a_completion_script_is_made_without_the_libraries_of_the_daemon() -> None:
+    packages = {module.partition(".")[0] for module in loaded_by("completion bash")}
+    assert not packages & {"numpy", "canopen", "can", "matplotlib", "rich"}
+
+
 def test_a_look_at_the_status_does_without_the_heavier_rooms_of_the_standard_library(server: Server) -> None:
     assert not loaded_by("status") & {"asyncio", "logging", "subprocess", "argparse", "concurrent.futures"}
