@@ -209,8 +209,11 @@ class SocketCanBus(Bus):
             return
         for tap in self._tapping:
             tap(can_id, data, stamp)
-        if flags & _OURS and (flags & _OWN or can_id in self._heard):
-            self._hear(can_id, data, stamp, flags)
+        if flags & _OURS and can_id in self._heard:
+            self.counters.sent += not flags & _OWN
+            self._heard[can_id](can_id, data, stamp)
+            return
+        if flags & _OWN:
             return
         if self.down is not None:
             self._recover()
@@ -227,12 +230,6 @@ class SocketCanBus(Bus):
             return self._now_s
         stamp = wall_s + self._wall_to_loop_s
         return stamp if abs(stamp - self._now_s) < OLDEST_STAMP_S else self._now_s
-
-    def _hear(self, can_id: int, data: bytes, stamp: float, flags: int) -> None:
-        """A frame of this machine that was on the wire."""
-        if can_id in self._heard:
-            self.counters.sent += not flags & _OWN
-            self._heard[can_id](can_id, data, stamp)
 
     def _count_overflow(self, lost: int) -> None:
         """Count what the receive buffer had no room for; the kernel counts in 32 bits since the socket was made."""

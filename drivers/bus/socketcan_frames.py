@@ -81,23 +81,12 @@ def parse_ancillary(ancillary: Ancillary) -> tuple[float | None, int]:
 
     The kernel tells a count only where frames were lost, and None stands for a time that it did not tell.
     """
-    if len(ancillary) == 1:  # as a rule: the time, and nothing lost
-        _, kind, value = ancillary[0]
-        if kind == SO_TIMESTAMPNS:
-            return _wall_s(value), 0
     stamp_s: float | None = None
     lost = 0
     for _, kind, value in ancillary:
-        if kind == SO_TIMESTAMPNS:
-            stamp_s = _wall_s(value)
+        if kind == SO_TIMESTAMPNS and len(value) == _TIMESPEC_BYTES:
+            seconds, nanoseconds = _unpack_timespec(value)
+            stamp_s = seconds + nanoseconds * 1e-9
         elif kind == SO_RXQ_OVFL and len(value) == _COUNT.size:
             lost = _COUNT.unpack(value)[0]
     return stamp_s, lost
-
-
-def _wall_s(value: bytes) -> float | None:
-    if len(value) != _TIMESPEC_BYTES:
-        return None
-    seconds, nanoseconds = _unpack_timespec(value)
-    wall_s: float = seconds + nanoseconds * 1e-9
-    return wall_s
