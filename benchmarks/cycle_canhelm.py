@@ -132,12 +132,14 @@ class CanhelmCycle:
             raise RuntimeError(f"{self.name}: {self.recorder.status()} after {self._ran} cycles")
 
     def close(self) -> None:
-        """Take everything down."""
-        self.require_whole()
-        self.loop.run_until_complete(self._end())
-        self.loop.close()
-        self._far.close()
-        shutil.rmtree(self._folder)
+        """Take everything down; raises as :meth:`require_whole`."""
+        try:
+            self.require_whole()
+        finally:
+            self.loop.run_until_complete(self._end())
+            self.loop.close()
+            self._far.close()
+            shutil.rmtree(self._folder)
 
     async def _end(self) -> None:
         for recorder in (self.runs, self.recorder):

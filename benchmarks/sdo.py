@@ -21,7 +21,7 @@ def run(options: Options) -> Section:
     ratio = found.ratio("canhelm", "asyncio_floor")
     tables = (
         found.table(TITLE, "floor", "asyncio_floor"),
-        Table("canhelm", ("", "ratio of CPU", "at most"), (("to the asyncio floor", ratio, 1.3),)),
+        Table("canhelm", ("", "ratio of CPU", "wanted at most"), (("to the asyncio floor", ratio, 1.3),)),
     )
     picture = draw_bars(found, "CPU of one SDO upload [us]", options.out / "sdo.png")
     return Section("sdo", tables, {"rows": found.figures(), "ratios": {"canhelm_to_asyncio_floor": ratio}}, (picture,))
