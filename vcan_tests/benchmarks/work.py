@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from statistics import median
 from types import FrameType
 from typing import Any
@@ -15,6 +16,14 @@ ROUNDS = 31
 
 def bytecodes_of(run: Callable[[], None]) -> Counter[str]:
     """Bytecodes that this thread carries out while something runs, by file and function."""
+    with counting() as counted:
+        run()
+    return counted
+
+
+@contextmanager
+def counting() -> Iterator[Counter[str]]:
+    """Count the bytecodes of functions that are called within this context, by file and function."""
     counted: Counter[str] = Counter()
 
     def trace(frame: FrameType, event: str, _: Any) -> Any:
@@ -27,10 +36,9 @@ def bytecodes_of(run: Callable[[], None]) -> Counter[str]:
     before = sys.gettrace()
     sys.settrace(trace)
     try:
-        run()
+        yield counted
     finally:
         sys.settrace(before)
-    return counted
 
 
 def usual_bytecodes(run: Callable[[int], None]) -> float:
