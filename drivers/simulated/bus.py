@@ -16,7 +16,7 @@ from collections import defaultdict, deque
 from collections.abc import Callable, Iterable
 from heapq import heapify, heappop, heappush
 
-from drivers.bus.contract import ID_MASK, RTR_FLAG, Bus
+from drivers.bus.contract import ID_MASK, RTR_FLAG, Bus, FrameHandler
 from drivers.bus.wire_time import INTERMISSION_BITS, LoadMeter, frame_bits
 
 QUEUE_DEPTH = 64
@@ -136,6 +136,7 @@ class SimulatedBus:
         self._meter = LoadMeter(bit_rate)
         self._ports: list[SimulatedPort] = []
         self._routes: dict[int, tuple[SimulatedPort, ...]] = {}
+        self._taps: list[list[FrameHandler]] = []
         self._strangers: tuple[SimulatedPort, ...] = ()
         self._timer: asyncio.TimerHandle | None = None
         self._queue: list[_Queued] = []
@@ -184,8 +185,9 @@ class SimulatedBus:
             port.queued = int(self._current is not None and self._current[6] is port)
 
     def forget_routes(self) -> None:
-        """Work out anew who gets which identifier."""
+        """Work out anew who gets which identifier, and whose taps see it."""
         self._routes.clear()
+        self._taps = [port.taps for port in self._ports]
         self._strangers = tuple(port for port in self._ports if port.bit_rate != self.bit_rate)
 
     def transmit(self, port: SimulatedPort, can_id: int, data: bytes, deadline_s: float) -> None:
@@ -306,9 +308,8 @@ class SimulatedBus:
 
     def deliver(self, can_id: int, data: bytes, sender: SimulatedPort, end_s: float) -> None:
         """Let a frame arrive at everybody but its sender, stamped with ``end_s``."""
-        for port in self._ports:
-            if port.taps and port.connected:
-                self._show_to_taps(port, can_id, data, end_s)
+        if any(self._taps):
+            self._show_to_taps(can_id, data, end_s)
         route = self._routes.get(can_id)
         if route is None:
             route = self._routes[can_id] = self._find_route(can_id & ID_MASK)
@@ -322,12 +323,13 @@ class SimulatedBus:
             except Exception as error:  # noqa: BLE001 - one participant's mistake must not stop the wire
                 self._report(port, error)
 
-    def _show_to_taps(self, port: SimulatedPort, can_id: int, data: bytes, end_s: float) -> None:
-        for tap in tuple(port.taps):
-            try:
-                tap(can_id, data, end_s)
-            except Exception as error:  # noqa: BLE001 - a listener's mistake must not stop the wire
-                self._report(port, error)
+    def _show_to_taps(self, can_id: int, data: bytes, end_s: float) -> None:
+        for port in self._ports:
+            for tap in tuple(port.taps) if port.connected else ():
+                try:
+                    tap(can_id, data, end_s)
+                except Exception as error:  # noqa: BLE001 - a listener's mistake must not stop the wire
+                    self._report(port, error)
 
     def _find_route(self, number: int) -> tuple[SimulatedPort, ...]:
         return tuple(
