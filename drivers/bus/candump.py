@@ -18,10 +18,8 @@ _LINE = re.compile(
 
 
 _PACKED = struct.Struct("=dIB8s")
-_PACKED_HEAD = struct.Struct("=dIB8x")
 PACKED_BYTES = _PACKED.size
 """Of one packed frame."""
-_DATA_AT = PACKED_BYTES - 8
 pack_frame = _PACKED.pack
 """A frame as it is gathered where there is no time for a line: time stamp, identifier, length and data.
 :func:`make_lines` makes lines of many."""
@@ -58,14 +56,12 @@ def make_lines(packed: bytes | bytearray, epoch_s: float, interface: str) -> byt
     """
     heads: dict[int, str] = {}
     lines: list[str] = []
-    digits, place = packed.hex().upper(), 2 * _DATA_AT
-    for timestamp_s, can_id, length in _PACKED_HEAD.iter_unpack(packed):
+    for timestamp_s, can_id, length, data in _PACKED.iter_unpack(packed):
         head = heads.get(can_id)
         if head is None:
             head = heads[can_id] = f"{interface} {can_id & ID_MASK:03X}#{'R' if can_id & RTR_FLAG else ''}"
-        time_us = f"{round((epoch_s + timestamp_s) * 1e6):016d}"
-        lines.append(f"({time_us[:-6]}.{time_us[-6:]}) {head}{digits[place : place + 2 * length]}\n")
-        place += 2 * PACKED_BYTES
+        time_us = str(round((epoch_s + timestamp_s) * 1e6)).zfill(16)
+        lines.append(f"({time_us[:-6]}.{time_us[-6:]}) {head}{data[:length].hex().upper()}\n")
     return "".join(lines).encode()
 
 
