@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import copy
 import sys
 
 import pytest
@@ -13,7 +14,7 @@ from vcan_tests.benchmarks.work import counting
 
 CYCLE_HZ, CYCLES = 100.0, 20
 UNDER_WAY_S = 1.0
-ALLOWED = 43_500
+ALLOWED = 43_000
 """A cycle of the MAX2D that drives, daemon included: ten steps of physics, twelve frames. Counted on Python 3.11."""
 OTHERS = 1.0 if sys.version_info[:2] == (3, 11) else 1.1
 
@@ -31,12 +32,12 @@ async def test_a_simulated_cycle_takes_no_more_work_than_it_did() -> None:
     assert await bytecodes_a_cycle() <= ALLOWED * OTHERS
 
 
-async def test_a_second_look_at_each_tyre_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_needless_copy_of_each_tyre_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     deform = Contact.deform
 
-    def look_twice(tyre: Contact, rim: float, roll: float, lateral: float, load: float, dt: float) -> None:
-        assert (tyre.slip_ratio, tyre.slip_angle_rad) is not None
+    def deform_beside_a_copy(tyre: Contact, rim: float, roll: float, lateral: float, load: float, dt: float) -> None:
+        copy.copy(tyre)
         deform(tyre, rim, roll, lateral, load, dt)
 
-    monkeypatch.setattr(Contact, "deform", look_twice)
+    monkeypatch.setattr(Contact, "deform", deform_beside_a_copy)
     assert await bytecodes_a_cycle() > ALLOWED
