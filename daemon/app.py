@@ -26,8 +26,8 @@ from drivers.canopen.master import Master
 from drivers.contract import Drive
 from drivers.devices import Devices
 from drivers.simulated.bus import SimulatedPort
+from drivers.simulated.computer_trouble import ComputerTrouble
 from drivers.simulated.device_faults import Site
-from drivers.simulated.disk_trouble import DiskTrouble
 from drivers.simulated.faults import Faults
 from drivers.simulated.workshop import Workshop
 from profiles.faults import PlacedFault
@@ -137,25 +137,26 @@ class App:
             self.master, self.devices, period_s, self.supervisor.step, wire.pace, wire.reading_share, late
         )
         workshop = Workshop(built or profile, self.network) if self.network else None
-        self._disk = DiskTrouble()
-        self.faults = self._make_faults(seed)
+        self._trouble = ComputerTrouble()
+        self.faults = self._make_faults(seed, socket)
         self._faults_to_set = faults
-        commands = Commands(self.supervisor, self.network, workshop, self.faults)
+        commands = Commands(self.supervisor, self.network, workshop, self.faults, self._trouble)
         self.service = Service(profile.name, self.supervisor, commands, self.bus, self.cycle, profile_file)
         if runs:
-            self.service.runs = RunRecorder(runs, self.supervisor, self.bus, profile, bus, self._disk)
+            self.service.runs = RunRecorder(runs, self.supervisor, self.bus, profile, bus, self._trouble)
         self._localise(commands)
         self._groups = groups
         self.server = self._serve(socket) if socket else None
         self.door = self._serve_network(self.server, tcp) if self.server and tcp else None
         self.gateway = self._serve_tools(gateway) if gateway else None
 
-    def _make_faults(self, seed: int) -> Faults | None:
-        """What may go wrong in the simulated network."""
+    def _make_faults(self, seed: int, socket: Path | None) -> Faults | None:
+        """What may go wrong in the simulated network, and around it."""
         if self.network is None or self.medium is None:
             return None
         port = self.bus if isinstance(self.bus, SimulatedPort) else None
-        return Faults(Site(self.network, self.medium, port, self.wire.cable, self._disk), seed)
+        site = Site(self.network, self.medium, port, self.wire.cable, self._trouble, socket)
+        return Faults(site, seed)
 
     def _localise(self, commands: Commands) -> None:
         """Correct the vehicle's odometry by bearings, where its profile has reflectors."""
@@ -210,10 +211,10 @@ class App:
             Refused, ConfigError, PermissionRefused: a socket or the log cannot be opened.
             UsageError: a fault cannot happen in this network.
         """
-        if self.faults is not None:
-            self.faults.load(self._faults_to_set)
         if self.server is not None:
             await self.server.start()
+        if self.faults is not None:  # some are clients of the socket
+            self.faults.load(self._faults_to_set)
         if self.door is not None:
             await self.door.start()
         if self.gateway is not None:
@@ -226,7 +227,7 @@ class App:
                 self.supervisor.log,
                 self._record_bytes,
                 self._record_form,
-                self._disk,
+                self._trouble,
             )
             self.recorder.start()
             self.service.recorder = self.recorder

@@ -51,10 +51,14 @@ KindName = Literal[
     "brick_lost",
     "disk_full",
     "disk_slow",
+    "clock_jump",
+    "client_flood",
 ]
 KIND_NAMES: tuple[str, ...] = get_args(KindName)
 Count = Annotated[int, Meta(ge=1, le=1_000_000_000)]
 Share = Annotated[float, Meta(gt=0, le=1)]
+CLEARABLE_CLIENTS = 30
+"""Of the clients that a daemon has room for; beside more nobody would be let in who could clear their fault."""
 ObjectAddress = Annotated[str, Meta(pattern=ADDRESS_PATTERN)]
 
 NODES = ("drives", "encoders")
@@ -121,6 +125,10 @@ KINDS: dict[str, Kind] = {
     "brick_lost": Kind("an NXT brick out of range", ("bricks",), _AT_NODE, ("for_s",)),
     "disk_full": Kind("the disk that the daemon records on takes nothing more", (), (), ("for_s",)),
     "disk_slow": Kind("the disk that the daemon records on does each thing late", (), ("delay_s",), ("for_s",)),
+    "clock_jump": Kind("the clock that the daemon dates its records by is set, forward or back", (), ("jump_s",),
+                       ("for_s",)),
+    "client_flood": Kind("clients of the daemon that ask as fast as they can, and never read", (), ("clients",),
+                         ("for_s",)),
 }  # fmt: skip
 
 
@@ -156,6 +164,10 @@ class Fault(Part, frozen=True, kw_only=True, omit_defaults=True):
     """Of an encoder: of the motor shaft, or of the steered axis."""
     friction: Annotated[float, Meta(gt=0, le=2)] | None = None
     """Coefficient of friction."""
+    jump_s: Annotated[float, Meta(ge=-1e9, le=1e9)] | None = None
+    """By how much the clock is set."""
+    clients: Annotated[int, Meta(ge=1, le=64)] | None = None
+    """How many there are."""
 
 
 class FaultFile(Part, frozen=True, kw_only=True):
@@ -198,6 +210,9 @@ def objections(fault: Fault, profile: Profile) -> Iterator[Objection]:
         yield Objection(field, f"means nothing for {fault.kind}", f"leave it out; it takes {has}")
     if fault.at_s and fault.at_frame is not None:
         yield Objection("at_frame", "and at_s are two beginnings", "give one of them")
+    if (fault.clients or 0) > CLEARABLE_CLIENTS and fault.for_s is None:
+        remedy = f"write for_s: in a file, --for in a command, or at most {CLEARABLE_CLIENTS} clients"
+        yield Objection("for_s", "is missing: so many clients keep everybody out who could clear it", remedy)
     if fault.kind == "emcy" and fault.code is not None and fault.code > 0xFFFF:
         yield Objection("code", f"0x{fault.code:X} is no EMCY code", "give 0x0000 to 0xFFFF")
     if fault.part is not None and kind.parts:

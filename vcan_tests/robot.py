@@ -124,17 +124,20 @@ async def running_robot(
     powered: bool = True,
     booted: bool = True,
     expect_errors: bool = False,
+    socket: Path | None = None,
 ) -> AsyncIterator[Robot]:
     """A robot that has booted; asserts health at its end unless errors are expected.
 
     Args:
         bus: the SPEC of the wire.
         booted: wait until it is idle, its steering brakes known to be engaged.
+        socket: where clients reach it; the loop has to serve sockets.
         expect_errors: the test breaks something; logged errors and faults are its subject.
     """
     handler = _Collector()
     logging.getLogger().addHandler(handler)
-    app = App(profile or load("max2d").profile, bus, seed=seed, record=record, powered=powered, runs=runs, built=built)
+    model = profile or load("max2d").profile
+    app = App(model, bus, socket=socket, seed=seed, record=record, powered=powered, runs=runs, built=built)
     robot = Robot(app)
     before = asyncio.all_tasks()
     await app.start()

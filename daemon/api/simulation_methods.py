@@ -71,6 +71,8 @@ SIMULATION_METHODS = (
             Param("value", "integer", "what an object says instead of the truth", "", None, 0, 0xFFFF_FFFF),
             Param("angle_deg", "number", "of an encoder: of the motor shaft, or the steered axis", "deg", None),
             Param("friction", "number", "coefficient of friction", "", None, 0.0, 2.0),
+            Param("jump_s", "number", "by how much the daemon's clock is set", "s", None, -1e9, 1e9),
+            Param("clients", "integer", "how many clients flood the daemon", "", None, 1, 64),
         ),
         "fault (its number), kind, state (waiting, acting, over), struck (how often), and what was asked for",
     ),

@@ -40,6 +40,8 @@ def set_fault(
     value: int | None = None,
     angle: float | None = None,
     friction: float | None = None,
+    jump: float | None = None,
+    clients: int | None = None,
     options: Options = DEFAULT,
 ) -> None:
     """Put a fault into the simulated network, at once or later.
@@ -60,10 +62,20 @@ def set_fault(
         value: What an object says instead of the truth.
         angle: Degrees of an encoder: of the motor shaft, or the steered axis.
         friction: Coefficient of friction.
+        jump: Seconds by which the daemon's clock is set, back where negative.
+        clients: How many clients flood the daemon.
     """
     when = {"at_s": at, "at_frame": at_frame, "for_s": lasting}
     which = {"cob_id": cob_id, "object": object, "nth": nth, "probability": probability, "times": times}
-    what = {"delay_s": delay, "code": code, "value": value, "angle_deg": angle, "friction": friction}
+    what = {
+        "delay_s": delay,
+        "code": code,
+        "value": value,
+        "angle_deg": angle,
+        "friction": friction,
+        "jump_s": jump,
+        "clients": clients,
+    }
     given = {name: item for name, item in {**when, **which, **what}.items() if item is not None}
     with options.client() as client:
         where = {} if part is None else {"part": node_of(part)}

@@ -23,6 +23,7 @@ from daemon.runtime.simulation_commands import Network, SimulationCommands
 from daemon.runtime.supervisor import Supervisor
 from daemon.runtime.workshop_commands import Workshop, WorkshopCommands
 from drivers.contract import DriveState
+from drivers.simulated.computer_trouble import ComputerTrouble
 from drivers.simulated.faults import Faults
 
 OF_A_SETUP = ("motor.enable", "motor.reset", "brake.release")
@@ -37,6 +38,7 @@ class Commands:
         network: the simulated network; None where it is real.
         workshop: where the simulated robot stands; None where it is real.
         faults: of the simulated network; None where it is real.
+        trouble: what they make of its computer.
 
     Attributes:
         handlers: methods by name.
@@ -49,6 +51,7 @@ class Commands:
         network: Network | None = None,
         workshop: Workshop | None = None,
         faults: Faults | None = None,
+        trouble: ComputerTrouble | None = None,
     ) -> None:
         self._supervisor = supervisor
         self.handlers: dict[str, Handler] = {
@@ -63,7 +66,7 @@ class Commands:
             **EncoderCommands(supervisor).handlers,
             **SetupCommands(supervisor).handlers,
             **NetworkCommands(supervisor).handlers,
-            **FrameCommands(supervisor.master.bus).handlers,
+            **FrameCommands(supervisor.master.bus, trouble).handlers,
             **NodeCommands(supervisor).handlers,
             **ConfigCommands(supervisor).handlers,
             **SimulationCommands(supervisor, network).handlers,

@@ -9,7 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 
 from daemon.runtime.clock import VirtualTimeLoop
-from drivers.simulated.disk_trouble import DiskTrouble
+from drivers.simulated.computer_trouble import ComputerTrouble
 
 PAUSE_S = 0.01
 """Between two jobs that leave the control cycle its time."""
@@ -22,10 +22,10 @@ class Disk:
 
     Args:
         on_failure: called in the loop when a job has failed for what the disk said.
-        trouble: what faults make of a simulated robot's disk.
+        trouble: what faults make of a simulated robot's computer.
     """
 
-    def __init__(self, on_failure: Callable[[OSError], None], trouble: DiskTrouble) -> None:
+    def __init__(self, on_failure: Callable[[OSError], None], trouble: ComputerTrouble) -> None:
         self._loop = asyncio.get_running_loop()
         self._on_failure = on_failure
         self._trouble = trouble
@@ -45,11 +45,11 @@ class Disk:
         if size_bytes and self._pending_bytes + size_bytes > PENDING_LIMIT_BYTES:
             return False
         self._pending_bytes += size_bytes
-        if self._timer is None and not self._trouble.delay_s:
+        if self._timer is None and not self._trouble.disk_delay_s:
             self._carry_out(job, size_bytes)
         else:
             self._waiting.append((job, size_bytes))
-            self._timer = self._timer or self._loop.call_later(self._trouble.delay_s, self._take_turn)
+            self._timer = self._timer or self._loop.call_later(self._trouble.disk_delay_s, self._take_turn)
         return True
 
     def _carry_out(self, job: Callable[[], None], size_bytes: int) -> None:
@@ -73,7 +73,7 @@ class Disk:
         self._timer = None
         if self._waiting:
             self._carry_out(*self._waiting.popleft())
-            self._timer = self._loop.call_later(max(PAUSE_S, self._trouble.delay_s), self._take_turn)
+            self._timer = self._loop.call_later(max(PAUSE_S, self._trouble.disk_delay_s), self._take_turn)
 
     def close(self) -> None:
         """Wait until everything is done."""

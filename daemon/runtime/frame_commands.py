@@ -11,6 +11,7 @@ from daemon.runtime.handlers import Handler, Params
 from daemon.runtime.time_of_day import epoch_s
 from drivers.bus.candump import make_line
 from drivers.bus.contract import Bus
+from drivers.simulated.computer_trouble import ComputerTrouble
 
 KEPT = 20_000
 """Frames that are kept for clients that ask late; on a full bus of 1 Mbit/s a second or two."""
@@ -25,10 +26,12 @@ class FrameCommands:
 
     Args:
         bus: to listen to.
+        trouble: what faults make of a simulated robot's computer.
     """
 
-    def __init__(self, bus: Bus) -> None:
+    def __init__(self, bus: Bus, trouble: ComputerTrouble | None = None) -> None:
         self._bus = bus
+        self._trouble = trouble or ComputerTrouble()
         self._lines: deque[str] = deque(maxlen=KEPT)
         self._count = 0
         self._end: asyncio.TimerHandle | None = None
@@ -48,7 +51,7 @@ class FrameCommands:
         """Keep frames from now on, until nobody has asked for a while."""
         loop = asyncio.get_running_loop()
         if self._end is None:
-            self._epoch_s = epoch_s()
+            self._epoch_s = epoch_s(self._trouble)
             self._bus.taps.append(self._take)
         else:
             self._end.cancel()

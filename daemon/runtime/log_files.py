@@ -11,7 +11,7 @@ from pathlib import Path
 
 from daemon.runs.store import RESERVE_BYTES, no_room
 from daemon.runtime.log_forms import LogForm
-from drivers.simulated.disk_trouble import DiskTrouble
+from drivers.simulated.computer_trouble import ComputerTrouble
 
 PARTS = 8
 """A file takes this part of all room; then the next one begins."""
@@ -30,7 +30,7 @@ class LogFiles:
         robot: the robot's name.
         limit_bytes: what the robot's logs of the folder may take together; the oldest are deleted.
         sync: have what was written on the disk once a second (fdatasync(2)), against a power cut.
-        trouble: what faults make of a simulated robot's disk.
+        trouble: what faults make of a simulated robot's computer.
 
     Attributes:
         path: the file that is written to, once it is open.
@@ -39,7 +39,7 @@ class LogFiles:
     """
 
     def __init__(
-        self, path: Path, form: LogForm, robot: str, limit_bytes: int, *, sync: bool, trouble: DiskTrouble
+        self, path: Path, form: LogForm, robot: str, limit_bytes: int, *, sync: bool, trouble: ComputerTrouble
     ) -> None:
         self.path = path
         self.failing = False

@@ -16,7 +16,7 @@ from daemon.runtime.log_forms import CANDUMP, FORMS, LogForm
 from daemon.runtime.time_of_day import epoch_s
 from drivers.bus.candump import PACKED_BYTES, pack_frame
 from drivers.bus.contract import Bus
-from drivers.simulated.disk_trouble import DiskTrouble
+from drivers.simulated.computer_trouble import ComputerTrouble
 
 WRITE_PERIOD_S = 0.1
 """What the end of the process by a signal that nobody can catch may cost."""
@@ -41,7 +41,7 @@ class BusRecorder:
         events: where a disk that fails is told.
         limit_bytes: what the logs of a folder may take.
         form: of the log, unless the suffix of a file says it.
-        trouble: what faults make of a simulated robot's disk.
+        trouble: what faults make of a simulated robot's computer.
 
     Attributes:
         errors: attempts to write that failed.
@@ -55,12 +55,12 @@ class BusRecorder:
         events: EventLog,
         limit_bytes: int = LIMIT_BYTES,
         form: LogForm = CANDUMP,
-        trouble: DiskTrouble | None = None,
+        trouble: ComputerTrouble | None = None,
     ) -> None:
         self.errors = 0
         self._loop = asyncio.get_running_loop()
-        self._epoch_s = epoch_s()
-        self._trouble = trouble or DiskTrouble()
+        self._trouble = trouble or ComputerTrouble()
+        self._epoch_s = epoch_s(self._trouble)
         sync = not isinstance(self._loop, VirtualTimeLoop)
         self._form = next((each for each in FORMS.values() if path.suffix == each.suffix), form)
         self._files = LogFiles(path, self._form, robot, limit_bytes, sync=sync, trouble=self._trouble)

@@ -37,7 +37,7 @@ from daemon.runtime.time_of_day import epoch_s
 from drivers.bus.candump import make_lines, pack_frame
 from drivers.bus.contract import Bus
 from drivers.epos.drive import EposDrive
-from drivers.simulated.disk_trouble import DiskTrouble
+from drivers.simulated.computer_trouble import ComputerTrouble
 from profiles.schema import Profile
 
 LOGGER = logging.getLogger("canhelm.runs")
@@ -60,7 +60,7 @@ class RunRecorder:
         bus: whose frames are recorded while something moves.
         profile: the robot as it is run.
         spec: of the bus.
-        trouble: what faults make of a simulated robot's disk.
+        trouble: what faults make of a simulated robot's computer.
 
     Attributes:
         message: what the disk said of the newest run; empty while it works.
@@ -74,7 +74,7 @@ class RunRecorder:
         bus: Bus,
         profile: Profile,
         spec: str,
-        trouble: DiskTrouble | None = None,
+        trouble: ComputerTrouble | None = None,
     ) -> None:
         self.message = self.remedy = ""
         self._store = store
@@ -82,7 +82,7 @@ class RunRecorder:
         self._bus = bus
         self._profile = profile
         self._spec = spec
-        self._trouble = trouble or DiskTrouble()
+        self._trouble = trouble or ComputerTrouble()
         self._recordings: list[Recording] = []
         self._last: Path | None = None
         self._given_up = False
@@ -152,7 +152,7 @@ class RunRecorder:
     def _begin(self, motion: Motion, part: int = 1) -> None:
         self._end_closed()
         self.message, self.remedy, self._given_up = "", "", False
-        recording = Recording(motion, part, self._loop.time(), epoch_s())
+        recording = Recording(motion, part, self._loop.time(), epoch_s(self._trouble))
         recording.facts = self._facts(recording)
         self._recordings.append(recording)
         drives = self._confirmed()
@@ -256,7 +256,7 @@ class RunRecorder:
     # --- faults ------------------------------------------------------------------------------------------------
 
     def _keep_fault(self, slices: Sequence[Slice]) -> None:
-        supervisor, now_s, clock_unix_s = self._supervisor, self._loop.time(), epoch_s()
+        supervisor, now_s, clock_unix_s = self._supervisor, self._loop.time(), epoch_s(self._trouble)
         facts = {
             "kind": FAULT,
             "motion": ", ".join(motion.kind for motion in supervisor.motions.values()) or None,

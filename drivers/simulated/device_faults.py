@@ -6,14 +6,15 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf, radians
+from pathlib import Path
 from random import Random
 
 from canhelm.errors import UsageError
 from drivers.canopen.objects import parse_address
 from drivers.epos.codes import EMERGENCIES
 from drivers.simulated.bus import SimulatedBus, SimulatedPort
+from drivers.simulated.computer_trouble import ComputerTrouble
 from drivers.simulated.dictionary import Address, Value
-from drivers.simulated.disk_trouble import DiskTrouble
 from drivers.simulated.encoder import SimulatedEncoder
 from drivers.simulated.epos import SimulatedEpos
 from drivers.simulated.network import SimulatedNetwork
@@ -61,7 +62,8 @@ class Site:
         medium: its bus.
         port: by which the daemon, or the interface to it, is on that bus; None where it is not.
         cable: of a simulated serial line; None where there is none.
-        disk: that the daemon records on; None where it is in another process.
+        computer: that the daemon runs on; None where it is in another process.
+        socket: of the daemon; None where it has none, or is in another process.
         shafts: between motors and drives whose encoders were broken once, by the drives' names.
     """
 
@@ -69,7 +71,8 @@ class Site:
     medium: SimulatedBus
     port: SimulatedPort | None = None
     cable: SerialCable | None = None
-    disk: DiskTrouble | None = None
+    computer: ComputerTrouble | None = None
+    socket: Path | None = None
     shafts: dict[str, FaultyShaft] = field(default_factory=dict)
 
 
@@ -334,19 +337,6 @@ def _brick_lost(site: Site, fault: Fault, _: Random) -> Effect:
     return Effect(leave, lambda: setattr(link, "reachable", True))
 
 
-# The daemon's disk
-
-
-def _disk_fault(site: Site, fault: Fault, _: Random) -> Effect:
-    disk = site.disk
-    if disk is None:
-        remedy = "set it in `canhelm run --simulate`"
-        raise UsageError("the daemon is in another process", object="kind", value=fault.kind, remedy=remedy)
-    if fault.kind == "disk_full":
-        return Effect(lambda: setattr(disk, "full", True), lambda: setattr(disk, "full", False))
-    return Effect(lambda: setattr(disk, "delay_s", fault.delay_s), lambda: setattr(disk, "delay_s", 0.0))
-
-
 MAKERS: dict[str, Maker] = {
     "node_reset": _node_reset,
     "power_cycle": _power_cycle,
@@ -361,5 +351,4 @@ MAKERS: dict[str, Maker] = {
     **dict.fromkeys(("bus_off", "unplugged"), _adapter_fault),
     "serial_noise": _serial_noise,
     "brick_lost": _brick_lost,
-    **dict.fromkeys(("disk_full", "disk_slow"), _disk_fault),
 }

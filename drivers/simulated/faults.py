@@ -11,10 +11,12 @@ from typing import Any
 import msgspec
 
 from canhelm.errors import UsageError
+from drivers.simulated.computer_faults import COMPUTER_MAKERS
 from drivers.simulated.device_faults import MAKERS, Effect, Site
 from drivers.simulated.frame_faults import Choice, FaultySdo, FrameFault, FrameFaults, SdoFault
 from profiles.faults import Fault, PlacedFault
 
+_MAKERS = MAKERS | COMPUTER_MAKERS
 _SDO = ("sdo_abort", "sdo_timeout")
 
 
@@ -161,7 +163,7 @@ class Faults:
     # What
 
     def _make(self, fault: Fault, random: Random) -> tuple[Effect, Choice | None]:
-        make = MAKERS.get(fault.kind)
+        make = _MAKERS.get(fault.kind)
         if make is not None:
             return make(self._site, fault, random), None
         return self._sdo_fault(fault, random) if fault.kind in _SDO else self._frame_fault(fault, random)

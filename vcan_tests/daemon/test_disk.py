@@ -6,11 +6,11 @@ import asyncio
 from functools import partial
 
 from daemon.runtime.disk import PAUSE_S, Disk
-from drivers.simulated.disk_trouble import DiskTrouble
+from drivers.simulated.computer_trouble import ComputerTrouble
 
 
 def make_disk() -> Disk:
-    return Disk(lambda error: None, DiskTrouble())
+    return Disk(lambda error: None, ComputerTrouble())
 
 
 async def test_jobs_in_turns_come_in_order_with_pauses_between() -> None:

@@ -19,6 +19,7 @@ from profiles.loader import load
 from profiles.schema import Profile
 from vcan_tests.daemon.fake_backend import FakeBackend, served
 from vcan_tests.docs.pages import blocks
+from vcan_tests.long_life.loop import run_with_sockets
 from vcan_tests.robot import running_robot
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "faults.md"
@@ -42,7 +43,8 @@ def test_an_example_is_a_fault_that_its_robot_can_have(
 @pytest.mark.parametrize("kind", KIND_NAMES)
 def test_an_example_strikes_a_robot_that_boots(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bus = "rs232" if kind == "serial_noise" else "simulated"
-    run_virtual(strike(robot_of(kind), [example(kind, tmp_path, monkeypatch)], bus))
+    fault = example(kind, tmp_path, monkeypatch)
+    run_with_sockets(strike(robot_of(kind), [fault], tmp_path / "simulated.sock", bus))
 
 
 def test_the_example_of_a_wrong_identity_is_found_out_at_boot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -60,12 +62,13 @@ def test_every_fault_of_the_first_file_strikes(tmp_path: Path) -> None:
     (block,) = (block for block in blocks(PAGE.read_text("utf-8")) if block.file == "faults.yaml")
     file = tmp_path / block.file
     file.write_text(block.text, encoding="utf-8")
-    run_virtual(strike(MAX2D, [msgspec.structs.replace(placed.fault, at_s=0.0) for placed in load_faults(file, MAX2D)]))
+    faults = [msgspec.structs.replace(placed.fault, at_s=0.0) for placed in load_faults(file, MAX2D)]
+    run_with_sockets(strike(MAX2D, faults, tmp_path / "simulated.sock"))
 
 
-async def strike(robot_profile: Profile, faults: Sequence[Fault], bus: str = "simulated") -> None:
+async def strike(robot_profile: Profile, faults: Sequence[Fault], socket: Path, bus: str = "simulated") -> None:
     """Set faults before a robot boots, and wait until each has struck it once."""
-    async with running_robot(robot_profile, bus=bus, booted=False, expect_errors=True) as robot:
+    async with running_robot(robot_profile, bus=bus, socket=socket, booted=False, expect_errors=True) as robot:
         for fault in faults:
             await robot.call("simulation.fault", **msgspec.to_builtins(fault))
         set_faults = robot.app.faults

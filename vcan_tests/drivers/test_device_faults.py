@@ -68,7 +68,9 @@ async def test_a_power_cycle_gives_no_power_to_a_node_that_had_none() -> None:
     assert not robot.network.drives[PART].powered
 
 
-@pytest.mark.parametrize("fault", [{"kind": "disk_full"}, {"kind": "disk_slow", "delay_s": 1.0}])
-async def test_a_network_without_its_daemon_has_no_disk_to_break(fault: dict[str, Any]) -> None:
+@pytest.mark.parametrize(
+    "fault", [{"kind": "disk_full"}, {"kind": "disk_slow", "delay_s": 1.0}, {"kind": "clock_jump", "jump_s": 1.0}]
+)
+async def test_a_network_without_its_daemon_has_no_computer_to_break(fault: dict[str, Any]) -> None:
     with pytest.raises(UsageError, match="the daemon is in another process"):
         Robot().faults.add(msgspec.convert(fault, Fault))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from selectors import BaseSelector, SelectorKey
+from typing import Any, TypeVar
 
 from daemon.runtime.clock import VirtualTimeLoop
 
+T = TypeVar("T")
 LOOK_S = 0.001
 """Virtual time after which the sockets are looked at again."""
 
@@ -32,3 +34,9 @@ class VirtualSocketLoop(VirtualTimeLoop, asyncio.SelectorEventLoop):
             self._process_events(self._selector.select(0))
         if not self._ready:
             super()._advance()
+
+
+def run_with_sockets(coro: Coroutine[Any, Any, T]) -> T:
+    """Run a coroutine to its end on a :class:`VirtualSocketLoop`."""
+    with asyncio.Runner(loop_factory=VirtualSocketLoop) as runner:
+        return runner.run(coro)

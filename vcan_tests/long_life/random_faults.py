@@ -11,7 +11,7 @@ from profiles.faults import KIND_NAMES, KINDS
 from profiles.schema import Profile
 
 ELSEWHERE: Final = ("serial_noise", "brick_lost", "disk_full", "disk_slow")
-"""Kinds that a robot on a CAN bus does not know, and those of its computer."""
+"""Kinds that a robot on a CAN bus does not know, and those of its disk."""
 OBJECTS: Final = ("0x1000", "0x1018/1", "0x6040", "0x6041", "0x6060", "0x6064", "0x6083")
 OPTIONAL: Final = 0.5
 """Chance of what may be given and need not."""
@@ -28,6 +28,8 @@ VALUES: Final[Mapping[str, Callable[[Random], Any]]] = {
     "value": lambda random: random.randrange(1 << 16),
     "angle_deg": lambda random: random.uniform(-20.0, 20.0),
     "friction": lambda random: random.uniform(0.01, 0.3),
+    "jump_s": lambda random: random.uniform(-1e6, 1e6),
+    "clients": lambda random: random.randint(1, 3),
 }
 
 

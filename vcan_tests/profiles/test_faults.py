@@ -28,6 +28,8 @@ EXAMPLES: dict[str, Any] = {
     "value": 7,
     "angle_deg": 12.0,
     "friction": 0.1,
+    "jump_s": 3600.0,
+    "clients": 3,
 }
 PARTS = {"drives": "front_left", "encoders": "front", "brakes": "front", "bricks": "nxt"}
 
@@ -100,6 +102,8 @@ def test_a_part_that_is_no_name_is_refused_with_its_line(
         ("faults:\n- kind: lose\n  at_s: 1\n  at_frame: 2\n", "/faults.yaml:4: faults[0].at_frame: and at_s"),
         ("faults:\n- {kind: emcy, part: front, code: 0x10000}\n", "faults[0].code: 0x10000 is no EMCY code"),
         ("faults:\n- {kind: sdo_abort, part: front, object: statusword}\n", "write an object as 0x6041/0"),
+        ("faults:\n- {kind: client_flood, clients: 31}\n", "faults[0].for_s: is missing: so many clients keep"),
+        ("faults:\n- {kind: clock_jump, jump_s: .nan}\n", "/faults.yaml:2: faults[0].jump_s: is "),
         ("", "/faults.yaml:1: is empty; write faults: with a list of them"),
         ("faults: 3\n", "/faults.yaml:1: faults: is 3; write a list of"),
         ("- kind: lose\n", "/faults.yaml:1: is not a mapping"),

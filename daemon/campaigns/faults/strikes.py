@@ -104,9 +104,10 @@ STRIKES: Final[dict[str, Strike]] = {
 OTHER_ROBOTS: Final = {
     "serial_noise": "needs a serial line",
     "brick_lost": "needs a brick",
-    **dict.fromkeys(("disk_full", "disk_slow"), "needs a recording"),
+    **dict.fromkeys(("disk_full", "disk_slow", "clock_jump"), "needs a recording"),
+    "client_flood": "needs a socket",
 }
-"""Kinds of faults that a MAX2D on CAN, of which nothing is recorded, cannot have."""
+"""Kinds of faults that a MAX2D on CAN, of which nothing is recorded and which has no socket, cannot have."""
 
 
 @dataclass(frozen=True, slots=True, order=True)

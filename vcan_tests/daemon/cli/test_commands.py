@@ -68,6 +68,12 @@ SENT: list[tuple[str, str, dict[str, Any]]] = [
         "simulation.fault",
         {"kind": "emcy", "part": 3, "code": 0x4210, "at_s": 1.5},
     ),
+    ("sim fault clock_jump --jump -3600", "simulation.fault", {"kind": "clock_jump", "jump_s": -3600.0}),
+    (
+        "sim fault client_flood --clients 40 --for 5",
+        "simulation.fault",
+        {"kind": "client_flood", "clients": 40, "for_s": 5.0},
+    ),
     ("sim fault clear", "simulation.clear_faults", {"fault": None}),
     ("sim fault clear 2", "simulation.clear_faults", {"fault": 2}),
     ("sim input 3 1 low", "simulation.input", {"node": 3, "input": 1, "level": "low"}),
