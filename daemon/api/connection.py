@@ -63,7 +63,7 @@ class Connection(asyncio.Protocol):
         self._handling = False
         self._deaf = False
         self._malformed = 0
-        self._meter = Meter(self._heard_s)
+        self._meter: Meter
         self._lease: str | None = None
         self._pending: set[asyncio.Task[None]] = set()
         self._moving: set[asyncio.Task[None]] = set()
@@ -91,6 +91,7 @@ class Connection(asyncio.Protocol):
         if not self._known:
             self._peer = self._server.rights.peer(transport.get_extra_info("socket"))
         self._name = f"client {self._name.split()[-1]} ({self._peer.name or f'pid {self._peer.pid}'})"
+        self._meter = self._server.meters.lend(self._peer.uid, self._heard_s)
         self._server.admit(self)
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -99,6 +100,7 @@ class Connection(asyncio.Protocol):
         self._received.clear()
         self._stop_sampling()
         self._server.leave(self)
+        self._server.meters.give_back(self._peer.uid, self._meter)
         if self._lease is not None:
             self._server.backend.close_lease(self._lease)
             self._lease = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict, deque
 from typing import Final
 
 REQUESTS_PER_S: Final = 250
@@ -74,3 +75,19 @@ class Meter:
         """How long nothing more is read, for what was refused since this was asked."""
         pause_s, self._pause_s = self._pause_s, 0.0
         return pause_s
+
+
+class Meters:
+    """Meters of all connections: who hangs up and comes back finds what was left."""
+
+    def __init__(self) -> None:
+        self._unused: defaultdict[int, deque[Meter]] = defaultdict(deque)
+
+    def lend(self, user: int, now_s: float) -> Meter:
+        """The one of a user's former connections that has been unused for longest; a new one where there is none."""
+        unused = self._unused[user]
+        return unused.popleft() if unused else Meter(now_s)
+
+    def give_back(self, user: int, meter: Meter) -> None:
+        """Its connection has ended."""
+        self._unused[user].append(meter)

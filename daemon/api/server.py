@@ -19,6 +19,7 @@ from canhelm import protocol
 from canhelm.errors import Refused
 from daemon.api.connection import Connection
 from daemon.api.listeners import open_listener, remove_socket
+from daemon.api.metering import Meters
 from daemon.api.peers import Rights
 
 LOGGER = logging.getLogger("canhelm.api")
@@ -125,6 +126,7 @@ class Server:
         self.path = path
         self.rights = rights or Rights()
         self.counters = Counters()
+        self.meters = Meters()
         self.connections: set[Connection] = set()
         self.tasks: set[asyncio.Task[None]] = set()
         self._inherited = inherited

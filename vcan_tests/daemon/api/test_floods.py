@@ -200,6 +200,19 @@ async def test_who_flooded_may_ask_again_after_a_second() -> None:
         assert results((await flooder.until_answered(FLOOD + REQUESTS_PER_S))[FLOOD:]) == REQUESTS_PER_S
 
 
+async def test_who_floods_and_comes_back_finds_no_more_than_was_left() -> None:
+    async with flooded() as (_, server, _, _):
+        first = Talker(server)
+        first.say(b"".join(requests("hello", REQUESTS_PER_S)))
+        await first.until_answered(REQUESTS_PER_S)
+        first.hang_up()
+        again = Talker(server)
+        again.say(b"".join(requests("hello")))
+        carried_out = results(await again.until_answered(FLOOD))
+        again.hang_up()
+        assert carried_out < REQUESTS_PER_S * FLOOD / REFUSED_PER_S
+
+
 @pytest.mark.parametrize("end", [b"\n", b""])
 @pytest.mark.parametrize("length", [MAX_REQUEST_BYTES + 1, 100_000, 300_000])
 async def test_a_line_that_is_too_long_is_answered_with_the_limit_and_then_hung_up_on(length: int, end: bytes) -> None:
