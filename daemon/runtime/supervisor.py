@@ -18,6 +18,7 @@ from daemon.runtime.events import EventLog
 from daemon.runtime.holding import Holding
 from daemon.runtime.motions import Motion
 from daemon.runtime.plausibility import Plausibility
+from daemon.runtime.rolling import RollingWatch
 from daemon.runtime.stopping import MOTION, Stopping
 from daemon.runtime.tasks import TaskSet
 from daemon.runtime.vehicle import Vehicle, VehicleState
@@ -78,6 +79,7 @@ class Supervisor:
         self.spawn = self._tasks.spawn
         self._watch = DeviceWatch(devices, period_s, master.bus, master.network.late_after_cycles)
         self._plausibility = Plausibility(vehicle)
+        self._rolling = RollingWatch(vehicle.drives, self.log)
         self._stopping = stopping = Stopping(devices, vehicle, self.motions, self._tasks, self.log, self._drop_targets)
         self.stop, self.estop, self.fault = stopping.stop, stopping.estop, stopping.fault
         self.power_off, self.until_rest = stopping.power_off, stopping.until_rest
@@ -107,7 +109,7 @@ class Supervisor:
     @property
     def message(self) -> str:
         """One sentence about the state: what is wrong, or what is waited for."""
-        return self._stopping.message or self._bus_trouble or "; ".join(self._waiting())
+        return self._stopping.message or self._bus_trouble or "; ".join(self._waiting()) or self._rolling.sentence
 
     @property
     def _bus_trouble(self) -> str:
@@ -278,7 +280,9 @@ class Supervisor:
                 self.fault(fault)
 
     def _watch_readings(self, measurement: Measurement, dt_s: float) -> None:
-        powered = self.powered and not self._stopping.latched
+        powered = self.powered
+        self._rolling.look(measurement.time_s, powered=powered)
+        powered = powered and not self._stopping.latched
         driving = powered and any(motion.kind in self.vehicle.methods for motion in self.motions.values())
         fault = self._plausibility.look(measurement, self.command, dt_s, powered=powered, driving=driving)
         if fault is not None:
