@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 
+import msgspec
+
 from benchmarks.cycle_link import Link, make_pair
 from benchmarks.sdo_floors import NODE, VALUE, StructServer
 from drivers.bus.socketcan import SocketCanBus
@@ -12,6 +14,8 @@ from drivers.epos.objects import OBJECTS
 from profiles.loader import load
 
 STATUSWORD = OBJECTS["statusword"]
+PATIENCE_S = 10.0
+"""A machine that stands still for a while is no node that does not answer."""
 
 
 class SdoCanhelm:
@@ -22,7 +26,7 @@ class SdoCanhelm:
     def __init__(self) -> None:
         self.runner = asyncio.Runner()
         end, self._far = make_pair()
-        network = load("max2d").profile.network
+        network = msgspec.structs.replace(load("max2d").profile.network, sdo_timeout_s=PATIENCE_S)
         self._master = Master(SocketCanBus("bench1", network.bit_rate, lambda: Link(end, self._far)), network)
         self.client = self._master.sdo(NODE)
         self.runner.run(self._master.start())
