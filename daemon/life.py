@@ -11,8 +11,9 @@ from pathlib import Path
 from canhelm.errors import CanhelmError, Refused
 from daemon.app import App
 from daemon.runtime.notify import ServiceManager
+from daemon.runtime.stopping import OFF
 from daemon.runtime.vehicle import VehicleState
-from drivers.contract import Drive
+from drivers.contract import Drive, NodeState
 from profiles.kept import keep
 from profiles.schema import Profile
 
@@ -154,5 +155,15 @@ class Life:
 def _farewell(doubtful: tuple[Drive, ...]) -> str:
     if not doubtful:
         return "the vehicle is at rest and its drives are off"
-    names = ", ".join(f"node {drive.node} ({drive.name})" if drive.node else drive.name for drive in doubtful)
-    return f"ended without contact to {names}: make sure yourself that the vehicle is at rest and its drives are off"
+    doubts = ", ".join(map(_doubt, doubtful))
+    return f"ended, but {doubts}: make sure yourself that the vehicle is at rest and its drives are off"
+
+
+def _doubt(drive: Drive) -> str:
+    """Why a drive is not known to be at rest and off."""
+    who = f"node {drive.node} ({drive.name})" if drive.node else drive.name
+    if drive.node_state is not NodeState.READY:
+        return f"{who} does not answer"
+    if drive.state not in OFF:
+        return f"{who} was not seen switched off"
+    return f"the wheel of {who} still turns at {drive.speed_m_s:.2f} m/s"

@@ -94,8 +94,9 @@ class Motion(ABC):
         return {}
 
     def summary(self) -> dict[str, Any]:
-        """The motion for ``status``."""
-        return {"motion": self.identity, "kind": self.kind, "drives": list(self.drives), **self._told()}
+        """The motion for ``status``; of one that is over only that its drives are being stopped."""
+        told = {"phase": "stopping"} if self.ended.done() else self._told()
+        return {"motion": self.identity, "kind": self.kind, "drives": list(self.drives), **told}
 
     @property
     def terms(self) -> object:

@@ -150,7 +150,7 @@ def _misfit(drive: Drive, how: Misfit, check: CurrentAndMotion, rim: str) -> Dev
     in_vain, current_a = how is Misfit.IN_VAIN, round(abs(drive.current_a), 2)
     limit_a = round(check.limits.strong_a if in_vain else check.limits.weak_a, 3)
     does = f"has {current_a:g} A in vain" if in_vain else f"moves without current ({current_a:g} A)"
-    told = f"the motor of node {drive.node} ({drive.name}) {does}: its wheel turns at {rim}"
+    told = f"the motor of node {drive.node} ({drive.name}) {does}: its wheel turns at {rim} (limit: {limit_a} A)"
     return _fault(drive, told, current_a, limit_a, _MISFIT_REMEDIES[how])
 
 

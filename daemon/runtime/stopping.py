@@ -151,7 +151,7 @@ class Stopping:
         if not self.latched:
             self.cause = error
             self._cause_s = asyncio.get_running_loop().time()
-        self._halt(error)
+        self._halt(_until_reset(error))
         if not self._log.told(error.message):
             source = f"node {error.node}" if error.node else "supervisor"
             self._log.add("error", source, error.message, error.remedy or "")
@@ -285,3 +285,11 @@ class Stopping:
             await work
         except CanhelmError as error:
             self._log.add("error", name, error.message, error.remedy or "")
+
+
+def _until_reset(error: DeviceFault) -> DeviceFault:
+    """A fault as a motion ends by it: its remedy names the reset, too."""
+    remedy = "; then ".join(filter(None, (error.remedy, "`canhelm reset`")))
+    return DeviceFault(
+        error.message, node=error.node, object=error.object, value=error.value, limit=error.limit, remedy=remedy
+    )

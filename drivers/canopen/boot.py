@@ -24,6 +24,7 @@ LONGEST_PAUSE_S = 1.0
 REFUSED_PAUSE_S = 2.0
 """Time before a device that was refused is looked at again."""
 DEVICE_TYPE = (0x1000, 0)
+NO_BOOT_UP = "no boot-up; is motor power on?"
 _RESETS = (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION)
 STATE_WORDS = {int(state): state.name.lower().replace("_", "-") for state in NmtState}
 
@@ -49,6 +50,7 @@ class NodeBoot:
         self._gone = asyncio.Event()
         self._held = False
         self._restarted = False
+        self._booted = False
         self._guarded: asyncio.Future[None] | None = None
         self._wrong_toggle = False
         self._last_told = ""
@@ -112,7 +114,8 @@ class NodeBoot:
                 self._sign_of_life.clear()
             elif not self._sign_of_life.is_set():
                 self._device.node_state = NodeState.ABSENT
-                self._say("waiting", f"waiting for {self._who}: no boot-up; is motor power on?")
+                lacks = "no SDO answer since its boot-up; is it still powered?" if self._booted else NO_BOOT_UP
+                self._say("waiting", f"waiting for {self._who}: {lacks}")
             await self._pause(pause_s)
             pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
 
@@ -217,6 +220,7 @@ class NodeBoot:
             self._leave("rebooted", f"{self._who} has restarted", remedy)
         else:
             self._master.tell(self._node, "boot_up", "info", f"boot-up of {self._who}")
+        self._booted = True
         self._device.sdo.give_up("restarted")
 
     def _on_guarding_answer(self, toggle: int, state: int) -> None:
@@ -242,6 +246,7 @@ class NodeBoot:
     def _leave(self, kind: str, message: str, remedy: str, severity: str = "error") -> None:
         """The node was ready and is no longer. One that is held by command is guarded on, for it guards its life."""
         device = self._device
+        self._booted = False
         self._master.counters.nodes_lost += 1
         if not self._held:
             self._guard.disarm()

@@ -85,6 +85,20 @@ async def test_a_fault_while_driving_stops_the_robot_by_name_and_a_reset_gets_it
         await robot.call("drive.parallel", angle_deg=0.0, speed_m_s=0.2, duration_s=0.3)
 
 
+async def test_a_motion_that_a_fault_has_ended_is_told_as_stopping_until_its_drives_are_off() -> None:
+    async with _struck(kind="silence", part="front_left") as (robot, driving):
+        await robot.until(lambda: robot.state == "fault")
+        (motion,) = robot.app.service.status()["motions"]
+        assert motion.keys() == {"motion", "kind", "drives", "phase"}
+        assert motion["phase"] == "stopping"
+        await driving
+
+
+async def test_what_a_motion_ends_by_in_a_fault_names_the_reset() -> None:
+    async with _struck(kind="silence", part="front_left") as (_, driving):
+        assert (await driving).remedy.endswith("; then `canhelm reset`")
+
+
 @pytest.mark.parametrize("command", ["stop", "estop"])
 @pytest.mark.parametrize(
     "fault", [{"kind": "lose", "cob_id": 0x203}, {"kind": "pdo_long", "part": "front_left"}], ids=["lost", "too long"]
@@ -150,11 +164,12 @@ async def test_a_robot_drives_on_where_a_fault_is_small(fault: dict[str, Any]) -
         ),
         ({"kind": "sdo_abort"}, "refused access to 0x1000 (device_type): general error (0x08000000)"),
         ({"kind": "sdo_timeout", "object": "0x1018/1"}, "checking its identity"),
+        ({"kind": "sdo_timeout", "object": "0x1000/0"}, "no SDO answer since its boot-up; is it still powered?"),
         ({"kind": "wrong_identity"}, "another kind of device stands on this one"),
         ({"kind": "wrong_identity", "object": "0x1018/1", "value": 7}, "0x1018/1 (vendor_id)"),
         ({"kind": "power_cycle", "for_s": 3.0}, "no boot-up; is motor power on?"),
     ],
-    ids=["abort", "abort of all", "time-out", "device type", "vendor", "power"],
+    ids=["abort", "abort of all", "time-out", "never an answer", "device type", "vendor", "power"],
 )
 async def test_a_fault_at_boot_is_told_with_its_node_and_mended_when_it_is_gone(
     fault: dict[str, Any], told: str

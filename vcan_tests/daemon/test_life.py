@@ -275,3 +275,20 @@ async def test_the_last_words_of_a_daemon_without_a_bus_say_that_none_was_opened
     await asyncio.sleep(3.0)
     life.end()
     assert await running == f"ended before {missing} could be opened: no drive was commanded"
+
+
+async def test_the_last_words_name_a_drive_that_does_not_answer(daemon: Daemon) -> None:
+    async with running(daemon) as life:
+        daemon.robot.network.power_off(3)
+        await daemon.robot.until(lambda: daemon.robot.state != "idle")
+        daemon.life.end()
+        assert (await life).startswith("ended, but node 3 (front_left) does not answer: make sure yourself")
+
+
+async def test_the_last_words_tell_a_wheel_that_still_turns_from_a_drive_that_does_not_answer(daemon: Daemon) -> None:
+    async with running(daemon) as life:
+        drive = daemon.robot.app.devices.drives["front_left"]
+        daemon.robot.app.supervisor.observers.append(lambda: setattr(drive, "speed_m_s", -0.3))
+        await daemon.robot.until(lambda: drive.speed_m_s == -0.3)
+        daemon.life.end()
+        assert (await life).startswith("ended, but the wheel of node 3 (front_left) still turns at -0.30 m/s: make")
