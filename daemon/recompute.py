@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import msgspec
@@ -31,13 +32,14 @@ class Recomputed:
 
     Attributes:
         cycles: those with a motion that were computed again.
-        left_out: those with a motion that cannot be: it began before the recording, or is none of :data:`METHODS`.
+        left_out: those with a motion that cannot be, by the kind of that motion: it began before the recording, or is
+            none of :data:`METHODS`.
         difference: the first command that differs: time, drive, both speeds, limits of then and now; None where all
             are the same.
     """
 
     cycles: int = 0
-    left_out: int = 0
+    left_out: Counter[str] = field(default_factory=Counter)
     difference: dict[str, Any] | None = None
 
 
@@ -91,10 +93,11 @@ class _Again:
         command = msgspec.convert(record["command"], Command)
         running = [step for step in record["motions"] if step["running"]]
         if running and record["state"] == VehicleState.ACTIVE and self._previous is not None:
-            if all(step["motion"] in self._motions for step in running):
-                self._compare(running, measurement, command, record)
+            unknown = [step["kind"] for step in running if step["motion"] not in self._motions]
+            if unknown:
+                self.found.left_out[", ".join(unknown)] += 1
             else:
-                self.found.left_out += 1
+                self._compare(running, measurement, command, record)
         self._vehicle.observe(measurement)
         self._previous, self._before_s = command, measurement.time_s
 

@@ -46,7 +46,7 @@ def show(
 
     Args:
         data: one object, or several (one line each).
-        table: makes a rich renderable or a string of the data for a terminal; None: a line a field.
+        table: makes a rich renderable or a string of the data for a terminal; None: a line a field, but for empty ones.
         json: True for JSON, False for the table, None: JSON unless stdout is a terminal.
     """
     if wants_json(json):
@@ -56,7 +56,8 @@ def show(
         console().print(table(data))
     else:
         for item in [data] if isinstance(data, Mapping) else data:
-            print("\n".join(line for key, value in item.items() for line in _field_lines(key, value)))
+            for line in (line for key, value in item.items() if words(value) for line in _field_lines(key, value)):
+                print(line)
 
 
 def _field_lines(key: str, value: Any) -> list[str]:
@@ -78,7 +79,7 @@ def plain(value: Any) -> Any:
 
 
 def words(value: Any, digits: int = 4) -> str:
-    """A value for people: short numbers, yes and no, a dash for nothing."""
+    """A value for people: short numbers, yes and no, a dash for nothing; empty fields are left out."""
     if value is None:
         return "-"
     if isinstance(value, bool):
@@ -86,7 +87,7 @@ def words(value: Any, digits: int = 4) -> str:
     if isinstance(value, float):
         return f"{value:.0f}" if 10**digits <= abs(value) < 1e12 else f"{value:.{digits}g}"
     if isinstance(value, Mapping):
-        return ", ".join(f"{key} {words(item, digits)}" for key, item in value.items())
+        return ", ".join(f"{key} {told}" for key, item in value.items() if (told := words(item, digits)))
     if isinstance(value, list | tuple):
         return ", ".join(words(item, digits) for item in value)
     return str(value)

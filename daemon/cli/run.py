@@ -38,7 +38,7 @@ def run(
     socket: Path | None = None,
     record: str | None = None,
     record_mb: int = 1000,
-    record_format: Literal["candump", "mcap"] = "candump",
+    record_format: Literal["candump", "mcap"] | None = None,
     unpowered: Annotated[bool, Parameter(negative=())] = False,
     gateway: Path | None = None,
     gateway_tcp: int | None = None,
@@ -70,7 +70,8 @@ def run(
         socket: Where to listen; the default is the robot's socket in the runtime folder.
         record: Folder or file (`.log`, `.mcap`) for everything that goes over the bus.
         record_mb: What the logs of that folder may take; the oldest are deleted.
-        record_format: Text as candump writes it, or MCAP for Foxglove, PlotJuggler and Rerun.
+        record_format: Text as candump writes it, or MCAP for Foxglove, PlotJuggler and Rerun; the default is what the
+            name of the file says, and candump for a folder.
         unpowered: Simulated drives have no power until `canhelm sim power all on`.
         gateway: Where other CANopen tools connect (CiA 309-3); the default is beside the socket, as NAME.309.sock.
         gateway_tcp: Port on the loopback interface for such tools as well, to read only.
@@ -121,7 +122,7 @@ def run(
         socket=path,
         record=Path(record) if record else None,
         record_bytes=record_mb * 1_000_000,
-        record_form=FORMS[record_format],
+        record_form=FORMS[record_format or "candump"],
         seed=seed,
         powered=not unpowered,
         gateway=GatewayAccess(gateway or path.with_suffix(protocol.GATEWAY_SUFFIX), gateway_tcp, gateway_write),
@@ -207,15 +208,19 @@ async def _live(make_app: Callable[[Profile], App], source: str | None, robot: P
     return farewell
 
 
-def _refuse_recording(record: str | None, megabytes: int, form: str) -> None:
+def _refuse_recording(record: str | None, megabytes: int, form: str | None) -> None:
     """Raise UsageError for options of the recording that make no sense, or not together."""
+    from daemon.runtime.log_forms import FORMS
+
     if record == "":
         raise UsageError("--record is empty", remedy="name a folder or a file, as --record logs")
     if megabytes < 1:
         raise UsageError("--record-mb is below 1", value=megabytes, remedy="give megabytes, or leave --record out")
-    if form == "mcap" and record is not None and record.endswith(".log"):
-        remedy = "name a folder, or a file that ends in .mcap"
-        raise UsageError(f"--record {record} is no name of an MCAP file", value=record, remedy=remedy)
+    if record is None or form is None:
+        return
+    if any(name != form and record.endswith(other.suffix) for name, other in FORMS.items()):
+        remedy = f"name a folder, or a file that ends in {FORMS[form].suffix}; or leave --record-format out"
+        raise UsageError(f"--record {record} contradicts --record-format {form}", value=record, remedy=remedy)
 
 
 def _refuse_senseless(bus: str, *, unpowered: bool, virtual_time: bool) -> None:

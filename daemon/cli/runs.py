@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
 from canhelm.errors import UsageError
-from daemon.cli.output import Json, say, show
+from daemon.cli.output import Json, say, show, wants_json
 from daemon.cli.replay import frames_of
 from daemon.runs import store
 from daemon.runs.signs import read_signs
@@ -40,7 +40,7 @@ def list_(*, folder: Folder = None, robot: Robot = None, json: Json = None) -> N
         looked = ", ".join(map(str, store.searched(_folder(folder), os.environ)))
         whose = f" of {robot}" if robot else ""
         say(f"no runs{whose} in {looked}: each motion of `canhelm run` leaves one; --runs DIR looks elsewhere")
-    show([summary(run) for run in found], _table, json)
+    show([summary(run) for run in found], lambda _: _table(found), json)
 
 
 @runs.command(name="show")
@@ -55,7 +55,8 @@ def show_(name: str = LAST, /, *, folder: Folder = None, robot: Robot = None, js
     run = store.choose(find_runs(folder, robot), name)
     signs = read_signs(read_table(run), store.read_yaml(run.folder / PROFILE)) if run.facts.get("rows") else []
     files = sorted(path.name for path in run.folder.iterdir())
-    shown = {"run": run.number, **run.facts, "size_bytes": run.size_bytes}
+    ending = {"ended": run.facts.get("ended") if wants_json(json) else run.ending}
+    shown = {"run": run.number, **run.facts, **ending, "size_bytes": run.size_bytes}
     show({**shown, "stands_out": signs, "folder": str(run.folder), "files": files}, json=json)
 
 
@@ -118,6 +119,7 @@ def summary(run: Run) -> dict[str, Any]:
     return {
         "run": run.number,
         "begun": run.begun,
+        "when": run.when,
         "robot": run.robot,
         "vehicle": facts.get("vehicle"),
         "kind": facts.get("kind", "motion"),
@@ -129,17 +131,17 @@ def summary(run: Run) -> dict[str, Any]:
     }
 
 
-def _table(rows: Sequence[Mapping[str, Any]]) -> Table:
+def _table(found: Sequence[Run]) -> Table:
     from rich.table import Table
     from rich.text import Text
 
-    grid = Table("run", "begun (UTC)", "robot", "vehicle", "motion", "s", "ended", "MB", box=None, header_style="bold")
-    for row in rows:
-        ended = str(row["ended"] or "not ended: it runs, or its daemon was killed")
-        told = f"{ended}: {row['message']}" if row["message"] else ended
+    grid = Table("run", "when (UTC)", "robot", "vehicle", "motion", "s", "ended", "MB", box=None, header_style="bold")
+    for run in found:
+        row = summary(run)
+        told = f"{run.ending}: {row['message']}" if row["message"] else run.ending
         duration = "-" if row["duration_s"] is None else f"{row['duration_s']:.1f}"
-        begun = str(row["begun"])[:19].replace("T", " ")
+        when = run.when[:19].replace("T", " ")
         motion = f"fault in {row['motion'] or 'no motion'}" if row["kind"] == FAULT else str(row["motion"] or "-")
-        cells = [str(row["run"]), begun, str(row["robot"]), str(row["vehicle"] or "-"), motion]
+        cells = [str(run.number), when, run.robot, str(row["vehicle"] or "-"), motion]
         grid.add_row(*map(Text, [*cells, duration, told, f"{row['size_bytes'] / 1e6:.1f}"]))
     return grid

@@ -100,11 +100,9 @@ def _nothing(axes: Any) -> None:
 
 def _title(run: Run, signs: list[str]) -> str:
     facts = run.facts
-    ended = str(facts.get("ended", "not ended"))
-    if facts.get("message"):
-        ended = f"{ended}: {facts['message']}"
+    ended = f"{run.ending}: {facts['message']}" if facts.get("message") else run.ending
     lines = [
-        f"run {run.number} of {run.robot}: {facts.get('motion') or facts.get('kind')}, {run.begun}, {ended}",
+        f"run {run.number} of {run.robot}: {facts.get('motion') or facts.get('kind')}, {run.when}, {ended}",
         *signs,
     ]
     return "\n".join(part for line in lines for part in textwrap.wrap(line, 130))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -33,6 +34,7 @@ PARTS = 8
 RESERVE_BYTES = 50_000_000
 """What runs leave free on their disk for everything else."""
 LAST = "last"
+UNENDED = "not ended: it runs, or its daemon was killed"
 OFF = "off"
 """In place of a folder: keep none."""
 
@@ -60,6 +62,17 @@ class Run:
     def begun(self) -> str:
         """When it began, in UTC; sorts by time."""
         return str(self.facts.get("begun", ""))
+
+    @property
+    def when(self) -> str:
+        """When its motion began, or its fault struck, in UTC; sorts by time."""
+        return str(self.facts.get("struck", self.begun))
+
+    @property
+    def ending(self) -> str:
+        """How it ended, in words; the name of an error is taken apart (``DeviceFault``: device fault)."""
+        ended = self.facts.get("ended")
+        return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", str(ended)).lower() if ended else UNENDED
 
     @property
     def size_bytes(self) -> int:
@@ -216,7 +229,7 @@ def read_runs(folders: Iterable[Path], robot: str | None = None) -> list[Run]:
     runs = [
         Run(int(path.name), path, read_yaml(path / FACTS)) for folder in folders for path in RunStore(folder).folders()
     ]
-    return sorted((run for run in runs if robot in (None, run.robot)), key=lambda run: (run.begun, run.number))
+    return sorted((run for run in runs if robot in (None, run.robot)), key=lambda run: (run.when, run.number))
 
 
 def choose(runs: list[Run], name: str) -> Run:

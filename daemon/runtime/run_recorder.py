@@ -185,7 +185,7 @@ class RunRecorder:
         return {
             "robot": self._profile.name,
             "vehicle": vehicle.type if vehicle else None,
-            "begun": datetime.fromtimestamp(begun_unix_s, UTC).isoformat(timespec="milliseconds"),
+            "begun": _time_of_day(begun_unix_s),
             "begun_unix_s": round(begun_unix_s, 6),
             "bus": self._spec,
             "versions": {"canhelm": __version__, "python": platform.python_version(), "kernel": platform.release()},
@@ -261,6 +261,7 @@ class RunRecorder:
             "kind": FAULT,
             "motion": ", ".join(motion.kind for motion in supervisor.motions.values()) or None,
             "clock_unix_s": round(clock_unix_s, 6),
+            "struck": _time_of_day(clock_unix_s + now_s),
             "ended": str(supervisor.state),
             "message": supervisor.message,
         }
@@ -321,6 +322,10 @@ class RunRecorder:
         if not self.message:
             self._supervisor.log.add("warning", "runs", told, f"{remedy}; motions go on")
         self.message, self.remedy = told, remedy
+
+
+def _time_of_day(unix_s: float) -> str:
+    return datetime.fromtimestamp(unix_s, UTC).isoformat(timespec="milliseconds")
 
 
 def _ending(motion: Motion) -> dict[str, Any]:

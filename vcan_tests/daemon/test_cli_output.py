@@ -121,6 +121,11 @@ def test_an_object_without_a_table_is_a_line_a_field(capsys: pytest.CaptureFixtu
     assert capsys.readouterr().out == "radius_m: 1.235\ndone: yes\nreason: -\n"
 
 
+def test_what_is_empty_has_no_line_for_people(capsys: pytest.CaptureFixture[str]) -> None:
+    show({"message": "", "warnings": [], "result": {"slips": []}, "asked": {"to": [], "rate_hz": 0.0}}, json=False)
+    assert capsys.readouterr().out == "asked: rate_hz 0\n"
+
+
 def test_what_json_does_not_know_becomes_its_text() -> None:
     assert plain({1: (b"x", math.inf)}) == {"1": ["b'x'", None]}
 

@@ -51,6 +51,11 @@ async def test_a_fault_leaves_a_run_that_says_what_struck(fault: Run) -> None:
     assert "pressed by the test" in fault.facts["message"]
 
 
+async def test_the_fault_of_a_drive_is_newer_than_the_drive(fault: Run) -> None:
+    drive, last = read_runs([fault.folder.parent])
+    assert (last.number, last.begun < drive.when < last.when) == (fault.number, True)
+
+
 async def test_the_last_record_has_what_was_measured_and_commanded_and_every_law_s_terms(fault: Run) -> None:
     last = records(fault)[-2]
     assert last["state"] == "active"

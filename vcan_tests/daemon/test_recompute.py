@@ -47,7 +47,7 @@ def lines_of(fault: Path) -> list[bytes]:
 
 async def test_unchanged_loops_command_what_was_commanded(fault: Path) -> None:
     found = await recompute(load("max2d").profile, lines_of(fault))
-    assert (found.difference, found.left_out) == (None, 0)
+    assert (found.difference, found.left_out) == (None, {})
     assert found.cycles > 300
 
 
@@ -64,7 +64,7 @@ async def test_a_stop_on_the_way_is_computed_as_well(tmp_path: Path) -> None:
         await asyncio.sleep(0.1)
     fault = next(run.folder for run in read_runs([tmp_path]) if run.facts["kind"] == FAULT)
     found = await recompute(load("max2d").profile, lines_of(fault))
-    assert (found.difference, found.left_out, found.cycles > 100) == (None, 0, True)
+    assert (found.difference, found.left_out, found.cycles > 100) == (None, {}, True)
 
 
 async def test_a_stream_is_left_out(tmp_path: Path) -> None:
@@ -75,7 +75,7 @@ async def test_a_stream_is_left_out(tmp_path: Path) -> None:
         await asyncio.sleep(0.1)
     fault = next(run.folder for run in read_runs([tmp_path]) if run.facts["kind"] == FAULT)
     found = await recompute(load("max2d").profile, lines_of(fault))
-    assert (found.cycles, found.left_out > 0) == (0, True)
+    assert (found.cycles, list(found.left_out)) == (0, ["drive.set"])
 
 
 async def test_a_robot_whose_laws_heed_more_than_the_records_hold_is_refused() -> None:
@@ -97,7 +97,7 @@ async def test_the_first_command_that_was_another_one_is_shown(fault: Path) -> N
 async def test_a_motion_that_began_before_the_recording_is_left_out(fault: Path) -> None:
     lines = [line for line in lines_of(fault) if b'"begins"' not in line]
     found = await recompute(load("max2d").profile, lines)
-    assert (found.cycles, found.left_out > 300) == (0, True)
+    assert (found.cycles, found.left_out["drive.parallel"] > 300) == (0, True)
 
 
 async def test_a_line_that_is_no_record_is_named(fault: Path) -> None:
@@ -108,6 +108,26 @@ async def test_a_line_that_is_no_record_is_named(fault: Path) -> None:
 def test_the_command_takes_the_profile_beside_the_records(fault: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["replay", str(fault / RECORDS), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["difference"] is None
+
+
+def test_the_command_tells_which_motions_are_left_out(
+    fault: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cut = tmp_path / "cut.jsonl"
+    cut.write_bytes(b"\n".join(line for line in lines_of(fault) if b'"begins"' not in line))
+    assert main(["replay", str(cut), "--profile", "max2d", "--json"]) == 0
+    told = capsys.readouterr()
+    answer = json.loads(told.out)
+    assert answer["left_out_of"] == {"drive.parallel": answer["left_out"]}
+    assert f"left out: {answer['left_out']} of drive.parallel; only steer" in told.err
+
+
+def test_people_see_no_field_of_a_difference_where_there_is_none(
+    fault: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    assert main(["replay", str(fault / RECORDS)]) == 0
+    assert "difference" not in capsys.readouterr().out
 
 
 def test_another_profile_shows_where_it_would_have_been_driven_otherwise(

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from daemon.cli.main import main
-from daemon.replay import replay
+from daemon.cli.replay import table
+from daemon.replay import Replayed, replay
 from daemon.runs.store import FRAMES, RunStore, read_runs
 from daemon.runs.table import read_table
 from daemon.runtime.clock import run_virtual
@@ -85,11 +88,48 @@ def test_the_command_writes_rows_and_reports_in_the_order_of_time(
     assert "1 lines of copy.log" in output.err
 
 
+def drawn(replayed: Replayed, width: int) -> list[str]:
+    text = io.StringIO()
+    Console(file=text, width=width).print(table([*replayed.rows, *replayed.events]))
+    return text.getvalue().splitlines()
+
+
+async def test_eighty_columns_show_every_wheel_with_its_unit(log: Path) -> None:
+    lines = drawn(await replay(load("max2d").profile, frames(log), 0.5), 80)
+    heads = [[line[max(0, end - 6) : end].strip() for line in lines[:3]] for end in column_ends(lines[2])]
+    wheels = [[*name.split("_"), "m/s"] for name in ("rear_right", "rear_left", "front_left", "front_right")]
+    pose = [["", "time", "s"], ["", "x", "m"], ["", "y", "m"], ["", "yaw", "°"]]
+    assert heads == [*pose, *wheels, ["", "rear", "°"], ["", "front", "°"]]
+
+
+def column_ends(units: str) -> list[int]:
+    """Where the columns of a line of units end, which stand at the right."""
+    return [end for end in range(1, len(units) + 1) if units[end - 1] != " " and units[end : end + 1] in ("", " ")]
+
+
+async def test_what_was_reported_stands_below_on_one_line() -> None:
+    log = [LogFrame(10.0, "can0", 0x080, b""), LogFrame(12.5, "can0", 0x082, bytes.fromhex("1023030000000000"))]
+    replayed = await replay(load("max2d").profile, log, 0.1)
+    assert drawn(replayed, 120)[-1].rstrip().split(maxsplit=1) == ["2.500", replayed.events[0]["event"]]
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [(b"\x89MCAP0\r\n\x01", "is MCAP, and candump logs alone"), (b"\x89PNG\r\n\x1a\n", "is no candump log")],
+)
+def test_a_file_of_another_kind_is_told_to_be_one(
+    content: bytes, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_bytes(content)
+    assert main(["replay", str(tmp_path / "file")]) == 2
+    assert told in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("content", "options", "code"),
     [
         (None, [], 2),
-        ("nonsense\n", [], 7),
+        ("nonsense\n", [], 2),
         ("", ["--every", "-1"], 2),
         ("", ["--profile", "nobody"], 7),
         ("", ["--profile", "nxt"], 2),

@@ -197,6 +197,11 @@ def test_a_text_log_is_no_mcap_file(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "a file that ends in .mcap" in capsys.readouterr().err
 
 
+def test_an_mcap_file_is_no_text_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*SIMULATED, "--record", str(tmp_path / "bus.mcap"), "--record-format", "candump"]) == 2
+    assert "a file that ends in .log" in capsys.readouterr().err
+
+
 def test_an_empty_record_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*SIMULATED, "--record", ""]) == 2
     assert "--record is empty" in capsys.readouterr().err

@@ -12,7 +12,7 @@ from canhelm.errors import ConfigError
 from daemon.cli.main import main
 from daemon.runs.pictures import panels
 from daemon.runs.signs import currents_at_limit, mean_currents_a, read_signs, side_by_side
-from daemon.runs.store import PROFILE, TERMS, Run, RunStore, read_runs, read_yaml
+from daemon.runs.store import FACTS, PROFILE, TERMS, Run, RunStore, read_runs, read_yaml
 from daemon.runs.table import Table, read_table
 from daemon.runtime.clock import run_virtual
 from profiles.loader import load
@@ -145,6 +145,26 @@ def test_runs_show_tells_where_the_files_are(runs: Path, capsys: pytest.CaptureF
     shown = json.loads(capsys.readouterr().out)
     assert TERMS in shown["files"]
     assert shown["asked"] == Parallel
+
+
+@pytest.mark.parametrize(
+    ("ended", "told"),
+    [("DeviceFault", "device fault"), ("cut off", "cut off"), (None, "not ended: it runs, or its daemon was killed")],
+)
+def test_people_are_told_in_words_how_a_run_ended(
+    ended: str | None, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "0001").mkdir()
+    (tmp_path / "0001" / FACTS).write_text(yaml.safe_dump({"robot": "max2d", **({"ended": ended} if ended else {})}))
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    assert main(["runs", "show", "--runs", str(tmp_path)]) == 0
+    assert f"ended: {told}" in capsys.readouterr().out.splitlines()
+
+
+def test_programs_are_told_of_a_run_that_has_not_ended(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "0001").mkdir()
+    assert main(["runs", "show", "--runs", str(tmp_path), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["ended"] is None
 
 
 def test_runs_of_another_robot_are_left_out(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
