@@ -19,10 +19,14 @@ from pathlib import Path
 from typing import Any
 
 from rich.table import Table as Grid
+from rich.text import Text
 
 from benchmarks.section import Options, Section, Table
 from canhelm import __version__
-from daemon.cli.output import console, words
+from canhelm.errors import CanhelmError
+from daemon.cli.motion import INTERRUPTED
+from daemon.cli.output import console, say, say_error, words
+from daemon.cli.pictures import make_folder
 from vcan_tests.arguments import positive
 
 PARTS = (
@@ -42,22 +46,37 @@ PARTS = (
 BOOTED = ("vcan",)
 """Runs when it is asked for: needs a kernel's CAN."""
 RESULTS = "bench.json"
+SECONDS = """of each measurement (default 10); virtual ones in simulation, nodes, serial and the first table of rates;
+cycle and sdo have them for all their rows together; the starts in process take what they take"""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure what was asked for; what an earlier run found of other parts stays in the results."""
     asked = _parse(argv)
-    asked.out.mkdir(parents=True, exist_ok=True)
     logging.getLogger("canhelm").setLevel(logging.CRITICAL)  # robots at rates that no wire carries have much to say
-    for name in asked.parts or PARTS + BOOTED * asked.vcan:
-        with _progress(name) as tell:
-            section = measure(name, Options(asked.out, asked.seconds, tell))
-        keep(section, asked.out / RESULTS)
-        for table in section.tables:
-            console().print(grid(table), "")
-        for picture in section.pictures:
-            console().print(f"picture: {picture}")
+    names, done = asked.parts or PARTS + BOOTED * asked.vcan, 0
+    try:
+        make_folder(asked.out)
+        for name in names:
+            _measure_and_show(name, asked)
+            done += 1
+    except CanhelmError as error:
+        say_error(error)
+        return error.exit_code
+    except KeyboardInterrupt:
+        say(f"interrupted; kept in {asked.out / RESULTS}: {done} of {len(names)} parts")
+        return INTERRUPTED
     return 0
+
+
+def _measure_and_show(name: str, asked: argparse.Namespace) -> None:
+    with _progress(name) as tell:
+        section = measure(name, Options(asked.out, asked.seconds, tell))
+    keep(section, asked.out / RESULTS)
+    for table in section.tables:
+        console().print(grid(table), "")
+    for picture in section.pictures:
+        console().print(f"picture: {picture}", markup=False)
 
 
 def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
@@ -65,7 +84,7 @@ def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(known)} (default: all but vcan)")
     parser.add_argument("--out", type=Path, default=Path("bench-out"), help="folder for figures and pictures")
-    parser.add_argument("--seconds", type=positive, default=10.0, help="of each measurement (default 10)")
+    parser.add_argument("--seconds", type=positive, default=10.0, help=SECONDS)
     parser.add_argument("--vcan", action="store_true", help="the part vcan, too, on a kernel that is booted if need be")
     asked = parser.parse_args(argv)
     if unknown := sorted(set(asked.parts) - set(known)):
@@ -111,9 +130,11 @@ def _circumstances() -> dict[str, Any]:
 
 def grid(table: Table) -> Grid:
     """A table for a terminal."""
-    drawn = Grid(*table.heads, title=table.title, title_justify="left", box=None, header_style="bold")
+    drawn = Grid(title=Text(table.title), title_justify="left", box=None, header_style="bold")
+    for head in table.heads:
+        drawn.add_column(Text(head))  # a plain string loses its [us]: rich takes that for markup
     for row in table.rows:
-        drawn.add_row(*(words(value, 3) for value in row))
+        drawn.add_row(*(Text(words(value, 3)) for value in row))
     return drawn
 
 

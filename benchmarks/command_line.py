@@ -28,6 +28,8 @@ STANDARD, OTHERS = "the standard library", "others"
 LEAST_MS = 0.5
 """Packages that take less are counted among the others."""
 _OURS = ("canhelm", "daemon", "drivers", "profiles")
+_PROJECTS = {"attr": "attrs"}
+"""Packages by another name than their project's."""
 _LINE = "import time:"
 LEAST_RUNS = 3
 
@@ -135,24 +137,24 @@ def _owner(module: str) -> str:
     package = module.partition(".")[0]
     if package in _OURS:
         return OWN
-    return STANDARD if package in sys.stdlib_module_names else package
+    return STANDARD if package in sys.stdlib_module_names else _PROJECTS.get(package, package)
 
 
 def _commands_table(spreads: Mapping[str, Spread]) -> Table:
     alone_ms = spreads["python"].p50
-    rows: list[Sequence[str | float]] = []
+    rows: list[Sequence[str | float | None]] = []
     for command in COMMANDS:
         each = spreads[command.key]
         rows.append((command.words, each.p50, each.p99, each.p50 - alone_ms, each.count))
-    heads = ("a process", "p50 ms", "p99 ms", "p50 without Python's own start ms", "runs")
-    return Table("commands, their output a pipe", heads, rows)
+    heads = ("a process", "p50 [ms]", "p99 [ms]", "p50 without Python's own start [ms]", "runs")
+    return Table("commands, their output a pipe; p99 of 100 runs or more", heads, rows)
 
 
 def _imports_table(imports: Mapping[str, float]) -> Table:
     told = {owner: spent_ms for owner, spent_ms in imports.items() if spent_ms >= LEAST_MS}
     every = sum(imports.values())
     rows = [*told.items(), (OTHERS, every - sum(told.values())), ("all", every)]
-    return Table("what `canhelm status` loads, as -X importtime finds it", ("modules of", "ms"), rows)
+    return Table("what `canhelm status` loads, as -X importtime finds it", ("modules of", "time [ms]"), rows)
 
 
 def _figures(spreads: Mapping[str, Spread], imports: Mapping[str, float]) -> dict[str, object]:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-import shutil
-import tempfile
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from benchmarks.cycle_floors import PERIOD_S, LoopedCycles
 from benchmarks.cycle_link import Link, make_pair
@@ -69,7 +68,7 @@ class CanhelmCycle:
         self.loop = self._cycles.loop
         end, far = make_pair()
         self._robot, self._far = SocketRobot(far), far
-        self._folder = Path(tempfile.mkdtemp(prefix="canhelm-bench-", dir=MEMORY if MEMORY.is_dir() else None))
+        self._folder = TemporaryDirectory(prefix="canhelm-bench-", dir=MEMORY if MEMORY.is_dir() else None)
         self._ran = 0
         self.loop.run_until_complete(self._begin(Link(end, far), recording=recording))
         self.run(WARM_UP)
@@ -87,9 +86,10 @@ class CanhelmCycle:
         self.recorder: BusRecorder | None = None
         self.runs: RunRecorder | None = None
         if recording:
-            self.recorder = BusRecorder(self.bus, self._folder / "all.log", profile.name, self.supervisor.log)
+            folder = Path(self._folder.name)
+            self.recorder = BusRecorder(self.bus, folder / "all.log", profile.name, self.supervisor.log)
             self.recorder.start()
-            store = RunStore(self._folder / "runs")
+            store = RunStore(folder / "runs")
             self.runs = RunRecorder(store, self.supervisor, self.bus, profile, "socketcan:bench0")
             self.runs.start()
         await self.master.start()
@@ -132,14 +132,11 @@ class CanhelmCycle:
             raise RuntimeError(f"{self.name}: {self.recorder.status()} after {self._ran} cycles")
 
     def close(self) -> None:
-        """Take everything down; raises as :meth:`require_whole`."""
-        try:
-            self.require_whole()
-        finally:
-            self.loop.run_until_complete(self._end())
-            self.loop.close()
-            self._far.close()
-            shutil.rmtree(self._folder)
+        """Take everything down; :meth:`require_whole` tells afterwards, too."""
+        self.loop.run_until_complete(self._end())
+        self.loop.close()
+        self._far.close()
+        self._folder.cleanup()
 
     async def _end(self) -> None:
         for recorder in (self.runs, self.recorder):

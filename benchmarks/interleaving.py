@@ -5,12 +5,14 @@ from __future__ import annotations
 import gc
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from statistics import median
 from typing import Any, NamedTuple, Protocol
 
 from benchmarks.section import Table
 
 FEWEST_TURNS = 3
+HOW_RATIOS = "medians of all turns, a ratio that of each turn's ratios, not of the medians"
 
 
 class Row(Protocol):
@@ -77,7 +79,7 @@ class Measured:
             (row.name, *self.cost(row.key), self.ratio(row.key, floor), self.ratio(row.key, asyncio_floor))
             for row in self.rows
         ]
-        return Table(title, ("", "CPU [us]", "wall [us]", "x floor", "x asyncio floor"), rows)
+        return Table(f"{title}; {HOW_RATIOS}", ("", "CPU [us]", "wall [us]", "x floor", "x asyncio floor"), rows)
 
     def figures(self) -> dict[str, Any]:
         """The medians of all rows, for the JSON file."""
@@ -94,7 +96,9 @@ def measure(rows: Sequence[Row], count: int, seconds: float, tell: Callable[[str
         tell: hears how far it is.
     """
     turns: dict[str, list[Cost]] = {row.key: [] for row in rows}
-    try:
+    with ExitStack() as opened:
+        for row in reversed(rows):
+            opened.callback(row.close)
         for row in rows:
             row.run(count)
         end = time.monotonic() + seconds
@@ -102,10 +106,12 @@ def measure(rows: Sequence[Row], count: int, seconds: float, tell: Callable[[str
             tell(f"turn {len(turns[rows[0].key]) + 1}")
             for row in rows:
                 turns[row.key].append(_turn(row, count))
-    finally:
-        for row in rows:
-            row.close()
     return Measured(rows, turns)
+
+
+def verdict(ratio: float, wanted: float) -> str:
+    """Whether a ratio is at most what was wanted."""
+    return "met" if ratio <= wanted else "missed"
 
 
 def _turn(row: Row, count: int) -> Cost:

@@ -9,7 +9,7 @@ from typing import Any
 
 from benchmarks.pictures import draw_histograms
 from benchmarks.section import Options, Section, Table
-from benchmarks.spread import CELL_HEADS, spread
+from benchmarks.spread import cell_heads, spread
 from daemon.runtime.clock import Ticker
 
 PERIOD_S = 0.01
@@ -38,8 +38,8 @@ def ticks_in(seconds: float) -> int:
 
 def jitter_table(where: str, errors_us: Mapping[str, Sequence[float]]) -> Table:
     """Errors of the period by what paces SYNC."""
-    rows: list[tuple[str | float, ...]] = [(words, *spread(errors).cells) for words, errors in errors_us.items()]
-    return Table(f"|period - {1e3 * PERIOD_S:g} ms| on {where} [us]", ("SYNC paced by", *CELL_HEADS), rows)
+    rows: list[tuple[str | float | None, ...]] = [(words, *spread(errors).cells) for words, errors in errors_us.items()]
+    return Table(f"|period - {1e3 * PERIOD_S:g} ms| on {where}", ("SYNC paced by", *cell_heads("us")), rows)
 
 
 def period_errors_us(times_s: Sequence[float]) -> list[float]:

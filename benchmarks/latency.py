@@ -10,7 +10,7 @@ from time import perf_counter
 from benchmarks.pictures import draw_histograms
 from benchmarks.robots import STRAIGHT, begin, booted, robot_at
 from benchmarks.section import Options, Section, Table
-from benchmarks.spread import CELL_HEADS, histogram, log_edges, spread
+from benchmarks.spread import cell_heads, histogram, log_edges, spread
 from daemon.app import App
 from daemon.runtime.clock import run_precise
 
@@ -59,9 +59,9 @@ def run(options: Options) -> Section:
 
 def latency_table(values_us: Mapping[str, Sequence[float]]) -> Table:
     """Latencies by where they were measured."""
-    rows: list[tuple[str | float, ...]] = [(where, *spread(values).cells) for where, values in values_us.items()]
-    title = f"from the last TPDO's delivery to the last RPDO in the queue, MAX2D at {CYCLE_HZ:g} Hz [us]"
-    return Table(title, ("on", *CELL_HEADS), rows)
+    rows: list[tuple[str | float | None, ...]] = [(where, *spread(values).cells) for where, values in values_us.items()]
+    title = f"from the last TPDO's delivery to the last RPDO in the queue, MAX2D at {CYCLE_HZ:g} Hz"
+    return Table(title, ("on", *cell_heads("us")), rows)
 
 
 async def latencies_s(bus: str, seconds: float) -> list[float]:

@@ -24,9 +24,9 @@ class Load:
 
     Attributes:
         cycles: measured.
-        late: of these, those that ended after their period.
-        incomplete: of these, those whose step ran without some reading.
-        lost: frames that were not sent in time, or for which there was no room.
+        late_cycles: of these, those that ended after their period.
+        incomplete_cycles: of these, those whose step ran without some reading.
+        lost_frames: those that were not sent in time, or for which there was no room.
         bits: of SYNC and PDOs in a cycle, with their stuff bits.
         wire_share: share of the time that the wire was busy, guarding included.
         daemon_us: the daemon's time in a cycle, the least of several measurements; None where it was not seen: more
@@ -34,9 +34,9 @@ class Load:
     """
 
     cycles: int
-    late: int
-    incomplete: int
-    lost: int
+    late_cycles: int
+    incomplete_cycles: int
+    lost_frames: int
     bits: float
     wire_share: float
     daemon_us: float | None

@@ -23,6 +23,7 @@ CYCLE_HZ = 20.0
 """What the wire carries with 127 drives."""
 BIT_RATE = 1_000_000
 SETTLE_S = 1.0
+HEADS = ("drives", "daemon [us]", "by the line [us]", "bits", "least bits", "most bits", "the wire's limit [Hz]")
 PASSES = 3
 """One after the other, so that a machine that is slow for a while is so for all of them; the best one counts."""
 GUARD_TIME_MS, SDO_TIMEOUT_S, BOOT_STEP_S = 5000, 2.0, 20.0
@@ -43,6 +44,10 @@ class Line:
     each: float
     none: float
     residual: float
+
+    def at(self, count: float) -> float:
+        """The cost of so many by this line."""
+        return self.none + self.each * count
 
 
 def fit(counts: Sequence[float], costs: Sequence[float]) -> Line:
@@ -95,12 +100,15 @@ def run(options: Options, counts: Sequence[int] = COUNTS) -> Section:
 
 
 def _table(costs_us: Mapping[int, float], bits: Mapping[int, float], line: Line) -> Table:
-    rows = [(count, cost, bits[count], *cycle_bits(count), BIT_RATE / bits[count]) for count, cost in costs_us.items()]
+    rows = [
+        (count, cost, line.at(count), bits[count], *cycle_bits(count), BIT_RATE / bits[count])
+        for count, cost in costs_us.items()
+    ]
     title = (
-        f"the daemon's time in a cycle: {line.each:.2f} us a node and {line.none:.0f} us, "
-        f"at most {line.residual:.0f} us beside that line; {CYCLE_HZ:g} Hz, virtual time"
+        f"the daemon's time in a cycle, {CYCLE_HZ:g} Hz, virtual time; the straight line, {line.each:.2f} us a drive "
+        f"and {line.none:.0f} us, misses it by up to {line.residual:.0f} us"
     )
-    return Table(title, ("drives", "daemon [us]", "bits", "least bits", "most bits", "the wire's limit [Hz]"), rows)
+    return Table(title, HEADS, rows)
 
 
 def _draw(costs_us: Mapping[int, float], bits: Mapping[int, float], line: Line, path: Path) -> Path:
@@ -108,8 +116,12 @@ def _draw(costs_us: Mapping[int, float], bits: Mapping[int, float], line: Line, 
     figure, (cost, limit) = panels(1, 2, (12, 4.5))
     cost.plot(counts, list(costs_us.values()), "o", color=COLOURS[0])
     ends = [0, max(counts)]
-    cost.plot(ends, [line.none + line.each * end for end in ends], color="black", linewidth=0.9)
-    cost.set(title=f"{line.each:.2f} µs a node", xlabel="drives", ylabel="the daemon's time in a cycle [µs]")
+    cost.plot(ends, [line.at(end) for end in ends], color="black", linewidth=0.9)
+    cost.set(
+        title=f"{line.each:.2f} µs a drive, up to {line.residual:.0f} µs beside the line",
+        xlabel="drives",
+        ylabel="the daemon's time in a cycle [µs]",
+    )
     limit.plot(counts, [BIT_RATE / bits[count] for count in counts], "o-", color=COLOURS[0], label="the wire")
     by_daemon = [1e6 / cost for cost in costs_us.values()]
     limit.plot(counts, by_daemon, "s-", color=COLOURS[1], label="the daemon alone")

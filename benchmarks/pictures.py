@@ -34,7 +34,7 @@ def saved(figure: Any, path: Path) -> Path:
 
 
 def draw_histograms(values_us: Mapping[str, Sequence[float]], title: str, label: str, path: Path) -> Path:
-    """Times one above the other, on one logarithmic scale, each with its median and 99th percentile.
+    """Times one above the other on one logarithmic scale, with their medians and, of 100 or more, 99th percentiles.
 
     Args:
         values_us: the times by what they are of.
@@ -49,9 +49,12 @@ def draw_histograms(values_us: Mapping[str, Sequence[float]], title: str, label:
     for axes, colour, (words, values) in zip(rows, COLOURS, values_us.items(), strict=False):
         axes.stairs(histogram(values, edges), edges, fill=True, color=colour, alpha=0.7)
         found = spread(values)
-        for line, style in ((found.p50, "-"), (found.p99, "--")):
-            axes.axvline(line, color="black", linestyle=style, linewidth=0.9)
-        axes.set_title(f"{words}: p50 {found.p50:.0f} µs, p99 {found.p99:.0f} µs", fontsize="small", loc="left")
+        marks = {"p50": (found.p50, "-"), "p99": (found.p99, "--")}
+        known = {name: (value, style) for name, (value, style) in marks.items() if value is not None}
+        for value, style in known.values():
+            axes.axvline(value, color="black", linestyle=style, linewidth=0.9)
+        told = ", ".join(f"{name} {value:.0f} µs" for name, (value, _) in known.items())
+        axes.set_title(f"{words}: {told}", fontsize="small", loc="left")
         axes.set_xscale("log")
     rows[-1].set_xlabel(f"{label} [µs]")
     return saved(figure, path)

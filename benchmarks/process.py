@@ -41,8 +41,8 @@ def run(options: Options) -> Section:
         Table("start-up of the MAX2D, simulated", ("", "s"), rows),
         Table("resident memory, simulated network included", ("", "MiB"), list(memory.items())),
     ]
-    boot = {"virtual_s": inside_s["virtual time"], "real_s": inside_s["real time"]}
-    figures = {"boot": boot, "asked_s": asked_s, "idle_s": idle_s, "memory_mib": memory}
+    boot = {"boot_virtual_s": inside_s["virtual time"], "boot_real_s": inside_s["real time"]}
+    figures = {**boot, "asked_s": asked_s, "idle_s": idle_s, "memory_mib": memory}
     return Section("process", tables, figures)
 
 
@@ -61,7 +61,7 @@ def _boot_s(runner: Callable[[Coroutine[Any, Any, float]], float]) -> float:
 def _start(folder: Path, driving_s: float) -> tuple[float, float, dict[str, float]]:
     """Times from a process' start until it can be asked, and until it is idle; its memory [MiB] at some moments."""
     begin_s = time.monotonic()
-    daemon = Daemon(write_profile(folder), "simulated", niceness=0)
+    daemon = Daemon(write_profile(folder), "simulated", ("--runs", str(folder / "runs")), niceness=0)
     try:
         asked_s = time.monotonic() - begin_s
         memory = {"can be asked": _resident_mib(daemon)}

@@ -45,7 +45,8 @@ def run(options: Options) -> Section:
     )
     costs = Table(title, COST_HEADS, [cost_row(hz, found) for hz, found in loads.items()])
     figures = {
-        "cycle_bits": bits._asdict(),
+        "least_cycle_bits": bits.least,
+        "most_cycle_bits": bits.most,
         "highest_in_time_hz": in_time,
         "highest_complete_hz": complete,
         "loads": {f"{hz:g}": asdict(found) if found else None for hz, found in loads.items()},
@@ -56,16 +57,25 @@ def run(options: Options) -> Section:
     return Section("rates", tables, figures, [_draw(loads, bits, options.out / "rates.png")])
 
 
-COST_HEADS = ("rate [Hz]", "daemon [us a cycle]", "of a core", "wire busy", "late", "incomplete", "frames lost")
+COST_HEADS = (
+    "rate [Hz]",
+    "daemon [us a cycle]",
+    "of a core",
+    "wire busy",
+    "late cycles [%]",
+    "incomplete cycles [%]",
+    "lost frames",
+)
 
 
 def cost_row(hz: float, found: Load | None) -> tuple[str | float | None, ...]:
-    """One rate; where the wire was too full to boot, only the rate."""
+    """One rate; where the wire was too full to boot, that alone."""
     if found is None:
-        return (hz, *[None] * (len(COST_HEADS) - 1))
+        return (hz, "does not boot", *[None] * (len(COST_HEADS) - 2))
     core = None if found.daemon_us is None else f"{found.daemon_us * hz / 1e6:.2%}"
-    shares = (found.wire_share, found.late / found.cycles, found.incomplete / found.cycles)
-    return (hz, found.daemon_us, core, *(f"{share:.2%}" for share in shares), found.lost)
+    shares = [f"{100.0 * cycles / found.cycles:.2f}" for cycles in (found.late_cycles, found.incomplete_cycles)]
+    daemon = "not seen: readings come late" if found.daemon_us is None else found.daemon_us
+    return (hz, daemon, core, f"{found.wire_share:.2%}", *shares, found.lost_frames)
 
 
 def _load_at(hz: float, seconds: float, tell: Callable[[str], None]) -> Load | None:
@@ -78,11 +88,11 @@ def _load_at(hz: float, seconds: float, tell: Callable[[str], None]) -> Load | N
 
 
 def _is_in_time(found: Load | None) -> bool:
-    return found is not None and found.late <= ALLOWED_LATE * found.cycles and found.lost == 0
+    return found is not None and found.late_cycles <= ALLOWED_LATE * found.cycles and found.lost_frames == 0
 
 
 def _is_complete(found: Load | None) -> bool:
-    return found is not None and _is_in_time(found) and found.incomplete <= ALLOWED_LATE * found.cycles
+    return found is not None and _is_in_time(found) and found.incomplete_cycles <= ALLOWED_LATE * found.cycles
 
 
 def highest_kept(keeps: Callable[[float], bool]) -> int | None:
@@ -101,7 +111,7 @@ def _draw(loads: Mapping[float, Load | None], bits: Bits, path: Path) -> Path:
     shares = {
         "the wire is busy": [found.wire_share for found in booted.values()],
         "a core, by the daemon": [(found.daemon_us or math.nan) * hz / 1e6 for hz, found in booted.items()],
-        "cycles without some reading": [found.incomplete / found.cycles for found in booted.values()],
+        "cycles without some reading": [found.incomplete_cycles / found.cycles for found in booted.values()],
     }
     for colour, (words, values) in zip(COLOURS, shares.items(), strict=False):
         axes.plot(list(booted), [100.0 * value for value in values], "o-", color=colour, label=words)
@@ -136,7 +146,15 @@ def highest_of(results: Sequence[RateResult]) -> float | None:
 
 def real_table(where: str, results: Sequence[RateResult]) -> Table:
     """Rates in real time."""
-    heads = ("rate [Hz]", "cycles", "late", "latency [ms]", "worst latency [ms]", "worst jitter [ms]", "frames lost")
+    heads = (
+        "rate [Hz]",
+        "cycles",
+        "late cycles",
+        "median latency [ms]",
+        "worst latency [ms]",
+        "worst jitter [ms]",
+        "lost frames",
+    )
     rows = [
         (r.hz, r.cycles, r.late_cycles, r.latency_ms, r.worst_latency_ms, r.worst_jitter_ms, r.lost_frames)
         for r in results

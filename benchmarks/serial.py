@@ -20,7 +20,7 @@ def run(options: Options) -> Section:
     for baud in BAUD_RATES:
         options.tell(f"{baud} baud")
         found[baud] = run_virtual(_line(baud, options.seconds))
-    heads = ("baud", "cycles a second", "line busy", "idle for this side")
+    heads = ("baud", "cycles a second", "line busy", "waits for this side")
     rows = [(str(baud), hz, f"{busy:.1%}", f"{idle:.1%}") for baud, (hz, busy, idle) in found.items()]
     names = ("cycle_hz", "line_share", "own_idle_share")
     figures = {str(baud): dict(zip(names, values, strict=True)) for baud, values in found.items()}

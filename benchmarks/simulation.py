@@ -31,7 +31,7 @@ def run(options: Options) -> Section:
         cost_us = 1e6 * median(spans) / (options.seconds * CYCLE_HZ)
         rows.append((scene.words, median(factors), min(factors), max(factors), cost_us))
         figures.append({"scene": scene.words, "times_real_time": median(factors), "cycle_us": cost_us})
-    heads = ("the MAX2D", "x real time", "least", "most", "processor us a cycle")
+    heads = ("the MAX2D", "x real time", "least", "most", "processor [us a cycle]")
     table = Table(f"simulation and daemon, {CYCLE_HZ:g} Hz, on virtual time", heads, rows)
     return Section("simulation", [table], {"scenes": figures})
 

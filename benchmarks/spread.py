@@ -14,27 +14,30 @@ class Spread:
 
     Attributes:
         count: of the values.
-        p50, p90, p99: the least value that half of them, 90 and 99 of 100 do not exceed.
+        p50: the least value that half of them do not exceed.
+        p90, p99: likewise 90 and 99 of 100; None where there are too few for one to be beyond it: below 10 and 100.
         worst: the largest.
     """
 
     count: int
     p50: float
-    p90: float
-    p99: float
+    p90: float | None
+    p99: float | None
     worst: float
 
-    def figures(self, unit: str) -> dict[str, float]:
+    def figures(self, unit: str) -> dict[str, float | None]:
         """For the JSON file, with the unit in the names."""
         return {name if name == "count" else f"{name}_{unit}": value for name, value in asdict(self).items()}
 
     @property
-    def cells(self) -> tuple[float, ...]:
+    def cells(self) -> tuple[float | None, ...]:
         """For a table: p50, p90, p99, worst, count."""
         return (self.p50, self.p90, self.p99, self.worst, self.count)
 
 
-CELL_HEADS = ("p50", "p90", "p99", "worst", "of")
+def cell_heads(unit: str) -> tuple[str, ...]:
+    """The heads of such cells."""
+    return (*(f"{what} [{unit}]" for what in ("p50", "p90", "p99", "worst")), "count")
 
 
 def spread(values: Sequence[float]) -> Spread:
@@ -44,7 +47,9 @@ def spread(values: Sequence[float]) -> Spread:
     def rank(percent: int) -> float:
         return ordered[math.ceil(percent * len(ordered) / 100) - 1]
 
-    return Spread(len(ordered), rank(50), rank(90), rank(99), ordered[-1])
+    p90 = rank(90) if len(ordered) >= 10 else None
+    p99 = rank(99) if len(ordered) >= 100 else None
+    return Spread(len(ordered), rank(50), p90, p99, ordered[-1])
 
 
 def log_edges(least: float, most: float, per_decade: int) -> list[float]:

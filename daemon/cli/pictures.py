@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 from pathlib import Path
 
 from canhelm.errors import UsageError
@@ -10,15 +11,15 @@ from daemon.cli.output import say
 
 
 def make_folder(out: Path) -> None:
-    """Make the folder that ``--out`` names. Raises UsageError where that cannot be."""
+    """Make the folder that ``--out`` names. Raises UsageError where nothing can be written into it."""
+    remedy = "name a folder that this user may write to"
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise UsageError(
-            f"--out {out} is no folder and cannot be made one: {error.strerror}",
-            value=str(out),
-            remedy="name a folder that this user may write to",
-        ) from error
+        message = f"--out {out} is no folder and cannot be made one: {error.strerror}"
+        raise UsageError(message, value=str(out), remedy=remedy) from error
+    if not os.access(out, os.W_OK | os.X_OK):
+        raise UsageError(f"nothing can be written into --out {out}", value=str(out), remedy=remedy)
 
 
 def can_draw() -> bool:

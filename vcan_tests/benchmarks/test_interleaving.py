@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.bars import draw_bars
-from benchmarks.interleaving import FEWEST_TURNS, Cost, Measured, measure
+from benchmarks.interleaving import FEWEST_TURNS, Cost, Measured, measure, verdict
 
 
 class Counting:
@@ -63,6 +63,23 @@ def test_the_table_has_a_row_for_each() -> None:
     table = measured().table("title", "fast", "part")
     assert [row[0] for row in table.rows] == ["slow", "fast", "part"]
     assert {len(row) for row in table.rows} == {len(table.heads)}
+
+
+@pytest.mark.parametrize(("ratio", "told"), [(1.2, "met"), (1.3, "met"), (1.31, "missed")])
+def test_a_ratio_is_judged_by_what_was_wanted(ratio: float, told: str) -> None:
+    assert verdict(ratio, 1.3) == told
+
+
+def test_every_row_is_closed_where_one_cannot_be() -> None:
+    order: list[str] = []
+
+    class Stuck(Counting):
+        def close(self) -> None:
+            raise RuntimeError("stuck")
+
+    with pytest.raises(RuntimeError, match="stuck"):
+        measure([Stuck("a", order), Counting("b", order)], 7, 0.0, lambda _: None)
+    assert order[-1] == "b closed"
 
 
 def test_bars_are_drawn(tmp_path: Path) -> None:

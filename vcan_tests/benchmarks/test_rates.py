@@ -29,4 +29,4 @@ def test_a_rate_with_more_late_cycles_than_allowed_is_not_kept() -> None:
 
 def test_a_robot_that_drives_at_half_of_the_bus_s_limit_is_never_late() -> None:
     found = load_of(robot_at(400.0), STRAIGHT, 0.5, 1.0)
-    assert (found.late, found.lost) == (0, 0)
+    assert (found.late_cycles, found.lost_frames) == (0, 0)

@@ -42,6 +42,7 @@ def floor() -> float:
 def driving() -> Iterator[CanhelmCycle]:
     with closing(CanhelmCycle(recording=False)) as row:
         yield row
+        row.require_whole()
 
 
 def test_a_control_cycle_takes_no_more_work_than_it_did(driving: CanhelmCycle, floor: float) -> None:
@@ -51,6 +52,7 @@ def test_a_control_cycle_takes_no_more_work_than_it_did(driving: CanhelmCycle, f
 def test_nor_does_one_that_is_recorded(floor: float) -> None:
     with closing(CanhelmCycle(recording=True)) as row:
         assert usual_bytecodes(row.run) / floor <= RECORDED_CYCLE * OTHERS
+        row.require_whole()
 
 
 def test_an_object_for_each_frame_is_noticed(driving: CanhelmCycle, floor: float) -> None:
