@@ -56,7 +56,7 @@ SIMULATION_METHODS = (
         "simulation.fault",
         "Put a fault into the simulated network; which parameters a kind takes stands in docs/faults.md.",
         (
-            Param("kind", "string", "what happens", choices=KIND_NAMES),
+            Param("kind", "string", "what happens", choices=tuple(sorted(KIND_NAMES))),
             Param("part", "node", "drive, encoder, brake or brick that it happens to", default=None),
             Param("cob_id", "integer", "frames of this identifier only", "", None, 0, 0x7FF),
             Param("object", "string", "SDO transfers of this object only, as 0x6060 or 0x1018/2", default=None),

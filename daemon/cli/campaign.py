@@ -12,7 +12,7 @@ from cyclopts import App, Parameter
 from cyclopts.validators import Number
 
 from daemon.cli.campaign_faults import faults
-from daemon.cli.campaign_options import Out, Workers, work_off
+from daemon.cli.campaign_options import Out, Workers, work_off, worked_by
 from daemon.cli.output import Json, console, say, show, wants_json, words
 from daemon.cli.pictures import can_draw
 
@@ -104,7 +104,7 @@ def drive_missing(cases: Sequence[Case], out: Path, workers: int | None, dask: s
                 results.keep(batch)
                 yield len(batch)
 
-        work_off("runs", len(cases) - len(missing), len(cases), out, dask or f"{count} workers", kept())
+        work_off("runs", len(cases) - len(missing), len(cases), out, dask or worked_by(count), kept())
         write_parquet(results, out)
         return results.in_order()
 

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from cyclopts.validators import Number
 
 from canhelm.errors import UsageError
-from daemon.cli.campaign_options import Out, Workers, work_off
+from daemon.cli.campaign_options import Out, Workers, work_off, worked_by
 from daemon.cli.output import Json, console, plain, say, show, wants_json, words
 from daemon.cli.pictures import can_draw
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 SHOWN = 20
 """Violations that a person is shown at once; all are in the file."""
 
-Samples = Annotated[int, Parameter(validator=Number(gte=0))]
+Samples = Annotated[int, Parameter(validator=Number(gte=1))]
 Only = Annotated[str | None, Parameter(help="KIND:INDEX of one injection: plays it again, and tells what happens.")]
 
 
@@ -74,7 +74,7 @@ def _try(plan: Sequence[Injection], seed: int, out: Path, workers: int, json: bo
                 results.keep(outcome)
                 yield 1
 
-        work_off("injections", len(plan) - len(missing), len(plan), out, f"{workers} workers", kept())
+        work_off("injections", len(plan) - len(missing), len(plan), out, worked_by(workers), kept())
         tried = [results.tried[injection] for injection in plan]
     say(f"table and violations: {write_summary(out, seed, tried)}")
     _show(tried, json)

@@ -19,6 +19,11 @@ Workers = Annotated[int | None, Parameter(validator=Number(gte=1), help="Process
 Out = Annotated[Path, Parameter(help="Folder for results and pictures; a campaign that was ended goes on there.")]
 
 
+def worked_by(count: int) -> str:
+    """So many workers, in words."""
+    return "1 worker" if count == 1 else f"{count} workers"
+
+
 def work_off(what: str, there: int, total: int, out: Path, where: str, kept: Iterable[int]) -> None:
     """Work off what is missing of a campaign, and tell how far it is, on a terminal with a bar.
 

@@ -7,10 +7,12 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from types import FrameType
 from typing import Any
 
 from canhelm.client import Client
+from canhelm.errors import CanhelmError
 from daemon.cli.options import MotionOptions
 from daemon.cli.output import say, show, words
 
@@ -73,26 +75,36 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
 
 @contextmanager
 def progress_line(client: Client) -> Iterator[None]:
-    """One line on stderr that follows the motion, and the daemon's warnings above it; nothing off a terminal."""
+    """One line on stderr that follows the motion, and the daemon's warnings above it; nothing off a terminal.
+
+    What ends the motion and was among these warnings is not raised in the same words again.
+    """
     if not sys.stderr.isatty():
         yield
         return
-    client.on_notification = _draw
+    told: set[str] = set()
+    client.on_notification = partial(_draw, told)
     client.call("subscribe", rate_hz=PROGRESS_HZ)
     try:
         yield
+    except CanhelmError as error:
+        if error.message not in told:
+            raise
+        raise type(error)("the motion was ended by this", node=error.node, remedy=error.remedy) from error
     finally:
         client.on_notification = None
         print(CLEAR_LINE, end="", file=sys.stderr, flush=True)
 
 
-def _draw(method: str, params: dict[str, Any]) -> None:
+def _draw(told: set[str], method: str, params: dict[str, Any]) -> None:
     if method == "status":
         width = shutil.get_terminal_size().columns - 1
         print(f"{CLEAR_LINE}{cut(progress_text(params), width)}", end="", file=sys.stderr, flush=True)
     elif method == "event" and params.get("severity") != "info":
         print(CLEAR_LINE, end="", file=sys.stderr)
-        say(str(params.get("message")))
+        message = str(params.get("message"))
+        told.add(message)
+        say(message)
 
 
 def progress_text(status: dict[str, Any]) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import App, Parameter
 
 from daemon.cli.options import DEFAULT, Options, node_of
-from daemon.cli.output import say, show, words
+from daemon.cli.output import say, show, wants_json, words
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -18,7 +18,8 @@ fault = App(name="fault")
 Kind = Annotated[str, Parameter(help="What happens: lose, silence, emcy, encoder_stuck, ...; docs/faults.md has all.")]
 Part = Annotated[str | None, Parameter(help="Drive, encoder, brake or brick, by its name, or a node id.")]
 _OWN = ("fault", "kind", "part", "state", "struck")
-_HEXADECIMAL = ("cob_id", "code", "value")
+_DIGITS = {"cob_id": 3, "code": 4, "value": 1}
+"""Hexadecimal digits that a field has at least; SDO abort codes have eight."""
 
 
 @fault.default
@@ -79,7 +80,8 @@ def set_fault(
     given = {name: item for name, item in {**when, **which, **what}.items() if item is not None}
     with options.client() as client:
         where = {} if part is None else {"part": node_of(part)}
-        show(client.call("simulation.fault", kind=kind, **where, **given), json=options.json)
+        told = client.call("simulation.fault", kind=kind, **where, **given)
+    show(told if wants_json(options.json) else _as_typed(told), json=options.json)
 
 
 @fault.command
@@ -104,7 +106,8 @@ def faults(*, options: Options = DEFAULT) -> None:
         found: list[dict[str, Any]] = client.call("simulation.faults")["faults"]
     if not found:
         say("no fault is set; `canhelm sim fault KIND` sets one")
-    show(found, _table, options.json)
+    else:
+        show(found, _table, options.json)
 
 
 def _table(rows: Sequence[Mapping[str, Any]]) -> Table:
@@ -112,6 +115,16 @@ def _table(rows: Sequence[Mapping[str, Any]]) -> Table:
 
     table = Table(*_OWN, "more")
     for row in rows:
-        more = {key: hex(row[key]) if key in _HEXADECIMAL else row[key] for key in row if key not in _OWN}
+        more = {key: value for key, value in _as_typed(row).items() if key not in _OWN}
         table.add_row(*(words(row.get(key)) for key in _OWN), words(more))
     return table
+
+
+def _as_typed(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A fault with its identifiers and codes in hexadecimal."""
+    return {key: _hexadecimal(key, value) if key in _DIGITS else value for key, value in row.items()}
+
+
+def _hexadecimal(key: str, value: int) -> str:
+    digits = 8 if key == "code" and value > 0xFFFF else _DIGITS[key]
+    return f"0x{value:0{digits}X}"

@@ -193,12 +193,14 @@ class OmniVehicle(Vehicle):
         return OmniLaw(self._kinematics, guide, self.limits, self.senses, holds_wheels=not published)
 
     def _check(self, goal: PlanarState, limits: PlanarLimits) -> None:
-        numbers = (goal.x, goal.y, goal.heading, goal.vx, goal.vy, limits.speed, limits.acceleration)
-        if not all(abs(number) < FARTHEST for number in numbers) or limits.speed <= 0 or limits.acceleration <= 0:
-            raise UsageError(
-                "a place, heading, velocity or limit is not a finite number, or too large, or a limit not positive",
-                remedy=f"give numbers below {FARTHEST:g}",
-            )
+        bounds = {"speed_m_s": limits.speed, "acceleration_m_s2": limits.acceleration}
+        place = {"x_m": goal.x, "y_m": goal.y, "heading_deg": math.degrees(goal.heading)}
+        for name, number in {**place, "end_vx_m_s": goal.vx, "end_vy_m_s": goal.vy, **bounds}.items():
+            if not abs(number) < FARTHEST:
+                remedy = f"give a number below {FARTHEST:g}"
+                raise UsageError(f"{name} is {number:g}: not a finite number, or too large", object=name, remedy=remedy)
+            if name in bounds and number <= 0:
+                raise UsageError(f"{name} is {number:g}: not positive", object=name, remedy="give more than 0")
         require_at_most("speed", limits.speed, self.limits.speed, "m/s", "speed_m_s")
         require_at_most("acceleration", limits.acceleration, self.limits.acceleration, "m/s^2", "acceleration_m_s2")
         require_at_most("speed at the goal", math.hypot(goal.vx, goal.vy), limits.speed, "m/s", "speed_m_s")

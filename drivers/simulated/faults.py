@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import itertools
 from collections.abc import Callable, Iterable
 from random import Random
 from typing import Any
@@ -79,7 +78,7 @@ class Faults:
         self._site = site
         self._seed = seed
         self._set: dict[int, SetFault] = {}
-        self._numbers = itertools.count(1)
+        self._newest = 0
         self._timers: set[asyncio.TimerHandle] = set()
         self._at_frame: dict[int, list[SetFault]] = {}
         self._frames = FrameFaults(site.medium, self._later, self._on_frame)
@@ -96,9 +95,10 @@ class Faults:
 
     def add(self, fault: Fault) -> dict[str, Any]:
         """Set a fault, as of now; what it is told as. Raises UsageError where it cannot happen in this network."""
-        number = next(self._numbers)
+        number = self._newest + 1
         effect, choice = self._make(fault, Random(f"{self._seed} fault {number}"))
         new = self._set[number] = SetFault(number, fault, effect, choice)
+        self._newest = number
         if fault.at_frame is not None:
             self._at_frame.setdefault(self._frames.frames + fault.at_frame, []).append(new)
             self._count()

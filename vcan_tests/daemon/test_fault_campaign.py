@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from canhelm import __version__
 from canhelm.errors import ConfigError, UsageError
 from daemon.campaigns.faults import course, plan
 from daemon.campaigns.faults.limits import Limits, limits_of
@@ -17,6 +18,7 @@ from daemon.campaigns.faults.points import Point, note_points, try_all, try_one
 from daemon.campaigns.faults.results import LINES, SUMMARY, opened, table, write_summary
 from daemon.campaigns.faults.strikes import OTHER_ROBOTS, STRIKES, Injection
 from daemon.campaigns.faults.workers import outcomes_of
+from daemon.cli.campaign_options import worked_by
 from daemon.cli.main import main
 from daemon.runtime import watch
 from daemon.runtime.stopping import Stopping
@@ -219,8 +221,22 @@ def test_the_command_plays_one_injection_again(capsys: pytest.CaptureFixture[str
     assert "is silent" in told.err
 
 
-def test_an_injection_that_strikes_nothing_is_refused() -> None:
-    assert main(["campaign", "faults", "--only", "lose:999999"]) == 2
+def test_results_of_another_seed_are_refused_in_words(tmp_path: Path) -> None:
+    with opened(tmp_path, 1):
+        pass
+    told = rf"is of seed 1 and canhelm {__version__}, not of seed 2 and canhelm"
+    with pytest.raises(ConfigError, match=told), opened(tmp_path, 2):
+        pass
+
+
+@pytest.mark.parametrize(("count", "told"), [(1, "1 worker"), (2, "2 workers")])
+def test_who_works_is_told_in_words(count: int, told: str) -> None:
+    assert worked_by(count) == told
+
+
+@pytest.mark.parametrize("option", [("--only", "lose:999999"), ("--samples", "0")])
+def test_what_strikes_nothing_is_refused(option: tuple[str, str]) -> None:
+    assert main(["campaign", "faults", *option]) == 2
 
 
 def test_a_violation_is_told_and_makes_the_command_fail(

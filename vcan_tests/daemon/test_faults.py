@@ -12,11 +12,12 @@ from typing import Any
 import pytest
 
 from canhelm.errors import CanhelmError, DeviceFault, Refused, UsageError
+from daemon.api.simulation_methods import SIMULATION_METHODS
 from daemon.app import App
 from daemon.cli.main import main
 from daemon.demo import FIGURES, Demo
 from drivers.simulated.max2d import Max2dWorld
-from profiles.faults import load_faults
+from profiles.faults import load_faults, wanted
 from profiles.loader import load
 from profiles.schema import BodyGeometry
 from vcan_tests.daemon.nxt_twin import NXT
@@ -332,6 +333,18 @@ async def test_a_fault_that_cannot_happen_is_refused_with_a_remedy(fault: dict[s
             await robot.call("simulation.fault", **fault)
         assert caught.value.remedy
         assert (await robot.call("simulation.faults"))["faults"] == []
+
+
+async def test_a_refused_fault_uses_up_no_number() -> None:
+    async with running_robot() as robot:
+        with pytest.raises(UsageError):
+            await robot.call("simulation.fault", kind="serial_noise", probability=0.1)
+        assert (await robot.call("simulation.fault", kind="duplicate"))["fault"] == 1
+
+
+async def test_both_ways_to_set_a_fault_list_the_kinds_alike() -> None:
+    params = {param.name: param for method in SIMULATION_METHODS for param in method.params}
+    assert wanted("kind") == f"one of {', '.join(params['kind'].choices)}"
 
 
 @pytest.mark.parametrize(

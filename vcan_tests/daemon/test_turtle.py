@@ -142,6 +142,22 @@ async def test_after_a_fast_twist_it_comes_to_rest_by_its_ramp_and_stays(
 
 
 @pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"x_m": 1e5}, "x_m is 100000: not a finite number, or too large"),
+        ({"heading_deg": 1e9}, "heading_deg is 1e+09: not a finite number, or too large"),
+        ({"end_vy_m_s": -1e9}, "end_vy_m_s is -1e+09: not a finite number, or too large"),
+        ({"speed_m_s": 0.0}, "speed_m_s is 0: not positive"),
+    ],
+)
+async def test_which_number_of_a_goal_cannot_be_is_told(given: dict[str, float], told: str) -> None:
+    async with running_robot(TURTLE) as robot:
+        with pytest.raises(UsageError) as refused:
+            await robot.call("drive.to", **{"x_m": 1.0, "y_m": 0.0, **given})
+        assert refused.value.message == told
+
+
+@pytest.mark.parametrize(
     ("method", "params", "error"),
     [
         ("drive.to", {"x_m": math.nan, "y_m": 0.0}, UsageError),

@@ -38,6 +38,9 @@ class Heading:
     seed: int
     canhelm: str = __version__
 
+    def __str__(self) -> str:
+        return f"seed {self.seed} and canhelm {self.canhelm}"
+
 
 class FaultResults:
     """The open results file of one campaign; use :func:`opened`.
@@ -67,9 +70,10 @@ class FaultResults:
     def _take(self, number: int, line: str, heading: Heading) -> None:
         try:
             if number == 1:
-                if msgspec.json.decode(line, type=Heading) == heading:
+                found = msgspec.json.decode(line, type=Heading)
+                if found == heading:
                     return
-                what = f"is of {line}, not of {msgspec.json.encode(heading).decode()}"
+                what = f"is of {found}, not of {heading}"
             else:
                 outcome = msgspec.json.decode(line, type=Outcome)
                 self.tried[Injection(outcome.strike, outcome.index)] = outcome
