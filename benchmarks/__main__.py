@@ -53,7 +53,6 @@ cycle and sdo have them for all their rows together; the starts in process take 
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure what was asked for; what an earlier run found of other parts stays in the results."""
     asked = _parse(argv)
-    logging.getLogger("canhelm").setLevel(logging.CRITICAL)  # robots at rates that no wire carries have much to say
     names, done = asked.parts or PARTS + BOOTED * asked.vcan, 0
     try:
         make_folder(asked.out)
@@ -139,4 +138,5 @@ def grid(table: Table) -> Grid:
 
 
 if __name__ == "__main__":
+    logging.getLogger("canhelm").setLevel(logging.CRITICAL)  # robots at rates that no wire carries have much to say
     sys.exit(main())
