@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import importlib.util
-import os
 from pathlib import Path
+from tempfile import TemporaryFile
 
 from canhelm.errors import UsageError
 from daemon.cli.output import say
@@ -18,8 +18,11 @@ def make_folder(out: Path) -> None:
     except OSError as error:
         message = f"--out {out} is no folder and cannot be made one: {error.strerror}"
         raise UsageError(message, value=str(out), remedy=remedy) from error
-    if not os.access(out, os.W_OK | os.X_OK):
-        raise UsageError(f"nothing can be written into --out {out}", value=str(out), remedy=remedy)
+    try:
+        TemporaryFile(dir=out).close()
+    except OSError as error:
+        message = f"nothing can be written into --out {out}: {error.strerror}"
+        raise UsageError(message, value=str(out), remedy=remedy) from error
 
 
 def can_draw() -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 from pathlib import Path
@@ -131,9 +132,12 @@ def test_a_file_in_the_place_of_the_folder_is_refused(tmp_path: Path, capsys: py
 def test_a_folder_that_nothing_can_be_written_into_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(os, "access", lambda *_: False)
+    def read_only(dir: Path) -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    monkeypatch.setattr("daemon.cli.pictures.TemporaryFile", read_only)
     assert main(["nodes", "--out", str(tmp_path)]) == 2
-    assert f"nothing can be written into --out {tmp_path}" in capsys.readouterr().err
+    assert f"nothing can be written into --out {tmp_path}: Read-only file system" in capsys.readouterr().err
 
 
 def test_a_part_that_does_not_exist_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
