@@ -163,7 +163,7 @@ def _doubt(drive: Drive) -> str:
     """Why a drive is not known to be at rest and off."""
     who = f"node {drive.node} ({drive.name})" if drive.node else drive.name
     if drive.node_state is not NodeState.READY:
-        return f"{who} does not answer"
+        return f"{who} {'does not answer' if drive.node_state is NodeState.ABSENT else 'is not ready'}"
     if drive.state not in OFF:
         return f"{who} was not seen switched off"
     return f"the wheel of {who} still turns at {drive.speed_m_s:.2f} m/s"

@@ -15,6 +15,7 @@ from canhelm.errors import BusOff, CanhelmError, ConfigError, Refused
 from daemon.app import App
 from daemon.life import Life
 from daemon.runtime.notify import ServiceManager
+from drivers.contract import NodeState
 from profiles.kept import kept
 from profiles.loader import load
 from profiles.schema import Profile
@@ -277,12 +278,21 @@ async def test_the_last_words_of_a_daemon_without_a_bus_say_that_none_was_opened
     assert await running == f"ended before {missing} could be opened: no drive was commanded"
 
 
-async def test_the_last_words_name_a_drive_that_does_not_answer(daemon: Daemon) -> None:
+@pytest.mark.parametrize(
+    ("state", "told"), [(NodeState.ABSENT, "does not answer"), (NodeState.REFUSED, "is not ready")]
+)
+async def test_the_last_words_name_a_drive_that_nothing_is_known_of(
+    daemon: Daemon, state: NodeState, told: str
+) -> None:
     async with running(daemon) as life:
-        daemon.robot.network.power_off(3)
-        await daemon.robot.until(lambda: daemon.robot.state != "idle")
+        if state is NodeState.REFUSED:
+            await daemon.robot.call("simulation.fault", kind="wrong_identity", part="front_left")
+        await daemon.robot.call("simulation.power", node="front_left", on=False)
+        await daemon.robot.call("simulation.power", node="front_left", on=state is NodeState.REFUSED)
+        await daemon.robot.until(lambda: daemon.robot.app.devices.by_node[3].node_state is state)
+        await daemon.robot.hang_up()
         daemon.life.end()
-        assert (await life).startswith("ended, but node 3 (front_left) does not answer: make sure yourself")
+        assert (await life).startswith(f"ended, but node 3 (front_left) {told}: make sure yourself")
 
 
 async def test_the_last_words_tell_a_wheel_that_still_turns_from_a_drive_that_does_not_answer(daemon: Daemon) -> None:
