@@ -45,7 +45,11 @@ def load_eds(path: Path, node: int | None = None) -> LoadedEds:
         ConfigError: it cannot be read, or holds no object.
     """
     text = read_eds_text(path)
-    return LoadedEds(dictionary_of(text, node), text.warnings)
+    try:
+        dictionary = dictionary_of(text, node)
+    except ConfigError as error:
+        raise ConfigError(f"{path}: {error.message}", remedy=error.remedy) from None
+    return LoadedEds(dictionary, text.warnings)
 
 
 def dictionary_of(text: EdsText, node: int | None = None) -> ObjectDictionary:

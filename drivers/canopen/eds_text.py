@@ -200,7 +200,7 @@ class _Reader:
     def _entry(self, section: Section, line: str, number: int) -> None:
         key, equals, value = (part.strip() for part in line.partition("="))
         key = _KEYS.get(key.lower(), key)
-        if not equals or not key:
+        if not equals or not key or key.startswith(":"):
             self._warn(number, f"{_short(line)} is neither section nor entry; left out")
         elif key in section.values:
             self._warn(number, f"{key} stands in [{section.name}] twice; the first counts")

@@ -187,3 +187,20 @@ def test_a_file_that_holds_nothing_is_refused(tmp_path: Path) -> None:
             path.write_bytes(content)
         with pytest.raises(ConfigError, match=r"empty\.eds"):
             load_eds(path)
+
+
+def test_an_entry_whose_name_begins_with_a_colon_is_left_out_with_its_line() -> None:
+    text = parsed("[2000]\n:=\nParameterName=speed\nDataType=0x7\nAccessType=rw\n:x=1\n")
+    assert [warning.partition(" ")[0] for warning in text.warnings] == ["vendor.eds:2:", "vendor.eds:6:"]
+    assert dictionary_of(text)[0x2000].name == "speed"
+
+
+def test_what_the_library_cannot_read_is_told_with_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise ValueError("no")
+
+    monkeypatch.setattr("drivers.canopen.eds.import_eds", fail)
+    path = tmp_path / "odd.eds"
+    path.write_text("[2000]\nParameterName=speed\nDataType=0x7\nAccessType=rw\n")
+    with pytest.raises(ConfigError, match=r"odd\.eds: the library canopen cannot read the file: no"):
+        load_eds(path)
