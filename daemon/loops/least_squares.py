@@ -19,25 +19,40 @@ def least_squares(rows: Sequence[Row], values: Sequence[float]) -> Row:
     p = q = r = 0.0
     for (x, y, z), value in zip(rows, values, strict=True):
         p, q, r = p + x * value, q + y * value, r + z * value
-    return _solve(_normal(rows), p, q, r)
+    return _solve(normal(rows), p, q, r)
 
 
-_Normal = tuple[float, float, float, float, float, float, float]
-"""The inverse of the normal equations' matrix times its determinant, row by row of the upper half, and that."""
+class Normal(NamedTuple):
+    """The normal equations' symmetric matrix, as what its inverse is made of.
+
+    Attributes:
+        aa, ab, ac, bb, bc, cc: upper half of the inverse, times the determinant.
+        determinant: of the matrix.
+        diagonal: product of its diagonal, which the determinant never exceeds; far below it the matrix is singular.
+    """
+
+    aa: float
+    ab: float
+    ac: float
+    bb: float
+    bc: float
+    cc: float
+    determinant: float
+    diagonal: float
 
 
-def _normal(rows: Sequence[Row]) -> _Normal:
+def normal(rows: Sequence[Row]) -> Normal:
+    """The normal equations of some rows."""
     a = b = c = d = e = f = 0.0
     for x, y, z in rows:
         a, b, c = a + x * x, b + x * y, c + x * z
         d, e, f = d + y * y, e + y * z, f + z * z
-    minor_a, minor_b, minor_c = d * f - e * e, c * e - b * f, b * e - c * d
-    determinant = a * minor_a + b * minor_b + c * minor_c
-    return minor_a, minor_b, minor_c, a * f - c * c, b * c - a * e, a * d - b * b, determinant
+    aa, ab, ac = d * f - e * e, c * e - b * f, b * e - c * d
+    return Normal(aa, ab, ac, a * f - c * c, b * c - a * e, a * d - b * b, a * aa + b * ab + c * ac, a * d * f)
 
 
-def _solve(normal: _Normal, p: float, q: float, r: float) -> Row:
-    aa, ab, ac, bb, bc, cc, determinant = normal
+def _solve(equations: Normal, p: float, q: float, r: float) -> Row:
+    aa, ab, ac, bb, bc, cc, determinant, _ = equations
     return (
         (aa * p + ab * q + ac * r) / determinant,
         (ab * p + bb * q + bc * r) / determinant,
@@ -84,6 +99,6 @@ class Fits:
 
 
 def _fit(rows: Sequence[Row]) -> Fit:
-    normal = _normal(rows)
-    solved = [_solve(normal, *row) for row in rows]
+    equations = normal(rows)
+    solved = [_solve(equations, *row) for row in rows]
     return Fit(rows, ([x for x, _, _ in solved], [y for _, y, _ in solved], [z for _, _, z in solved]))

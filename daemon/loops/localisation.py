@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from itertools import combinations
 from typing import Final, NamedTuple
 
-from daemon.loops.least_squares import least_squares
+from daemon.loops.least_squares import least_squares, normal
 from daemon.loops.odometry import Pose
 from daemon.loops.path import Point, wrap
 
@@ -173,13 +173,7 @@ def _unit_covariance(pose: Pose, sightings: Sequence[Sighting]) -> Covariance | 
 
 def _inverse(rows: Sequence[Row]) -> Covariance | None:
     """Inverse of the rows' normal matrix; None where it is singular."""
-    a = b = c = d = e = f = 0.0
-    for x, y, z in rows:
-        a, b, c = a + x * x, b + x * y, c + x * z
-        d, e, f = d + y * y, e + y * z, f + z * z
-    minor_a, minor_b, minor_c = d * f - e * e, c * e - b * f, b * e - c * d
-    determinant = a * minor_a + b * minor_b + c * minor_c
-    if determinant <= _SINGULAR * max(a * d * f, _SINGULAR):
+    aa, ab, ac, bb, bc, cc, determinant, diagonal = normal(rows)
+    if determinant <= _SINGULAR * max(diagonal, _SINGULAR):
         return None
-    entries = (minor_a, minor_b, a * f - c * c, minor_c, b * c - a * e, a * d - b * b)
-    return Covariance(*entries).scaled(1 / determinant)
+    return Covariance(aa, ab, bb, ac, bc, cc).scaled(1 / determinant)
