@@ -275,7 +275,7 @@ def _descriptor_of(link: can.BusABC) -> int | None:
     """
     try:
         return link.fileno()
-    except NotImplementedError:
+    except NotImplementedError:  # what BusABC.fileno raises where a link has no descriptor, as that of `virtual:`
         return None
 
 
