@@ -123,11 +123,14 @@ class Stopping:
 
     async def stop(self, reason: str) -> None:
         """Quick stop of everything; returns when the vehicle is at rest and the drives are as before the motions."""
+        powered = self._any_power
         self._halt(Refused(f"the motion was stopped: {reason}"))
         self._halting += 1
         try:
             await self._insist()
-            await self._settled()
+            rested = await self._settled()
+            if rested and powered:
+                await self._rest_anew()
             if not self.latched:
                 for drive in self._drives:
                     if drive.state is DriveState.QUICK_STOP:
@@ -160,12 +163,11 @@ class Stopping:
     async def close(self) -> None:
         """The last stop: to rest, with every power stage off that has power."""
         self.closing = True
-        powered = bool(self._motions) or self.anything_enabled
+        powered = self._any_power
         self._halt(Refused("the motion was stopped: the daemon is going down"))
         if powered:
             await self._stop_and_disable()
-            self.rest.begin_anew()  # wheels may settle when their torque goes
-            await self.until_rest()
+            await self._rest_anew()
 
     async def reset(self) -> None:
         """Clear the latched emergency stop and faults.
@@ -252,17 +254,30 @@ class Stopping:
         except DeviceFault as error:
             self._on_failure(error)
 
-    async def _settled(self) -> None:
-        await self.until_rest()
+    async def _settled(self) -> bool:
+        rested = await self.until_rest()
         await self._tasks.wait(MOTION)
+        return rested
 
-    async def until_rest(self) -> None:
+    @property
+    def _any_power(self) -> bool:
+        return bool(self._motions) or self.anything_enabled
+
+    async def _rest_anew(self) -> None:
+        """Return when every wheel is at rest again: wheels settle when their torque goes."""
+        self.rest.begin_anew()
+        await self.until_rest()
+
+    async def until_rest(self) -> bool:
         """Return when every wheel that can be read has been at rest for some cycles.
 
-        A wheel that does not come to rest within the time that its ramp needs is reported; waiting ends then.
+        A wheel that does not come to rest within the time that its ramp needs is reported; waiting ends then, and
+        False is returned.
         """
-        if not await self.rest.until_rest(self._vehicle.stopping_time_s() + OVERRUN_S):
+        rested = await self.rest.until_rest(self._vehicle.stopping_time_s() + OVERRUN_S)
+        if not rested:
             self._report_unrest([drive.name for drive in self._drives if abs(drive.speed_m_s) > AT_REST_M_S])
+        return rested
 
     def _report_unrest(self, moving: list[str]) -> None:
         if moving:

@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from daemon.runtime.rest import AT_REST_CYCLES, RestWatch
+from daemon.runtime.rest import AT_REST_CYCLES, AT_REST_M_S, RestWatch
 from daemon.runtime.stopping import OVERRUN_S
 from vcan_tests.robot import Robot, running_robot
 
@@ -27,6 +27,19 @@ async def test_a_stop_while_drives_are_switched_off_leaves_none_with_power(momen
         await driving
         await asyncio.sleep(0.5)
         assert _powered(robot) == []
+
+
+@pytest.mark.parametrize("later_s", [0.0, 0.003, 0.006, 0.009, 0.02, 0.03])
+async def test_a_stop_has_ended_when_the_wheels_have_settled_without_their_torque(later_s: float) -> None:
+    async with running_robot() as robot:
+        driving = robot.begin("drive.parallel", angle_deg=0.0, speed_m_s=0.4, duration_s=5.0)
+        await robot.until(lambda: robot.speed_m_s > 0.38)
+        await asyncio.sleep(later_s)
+        await robot.call("stop")
+        assert max(abs(drive.speed_m_s) for drive in robot.app.devices.drives.values()) < AT_REST_M_S
+        await asyncio.sleep(0.01)
+        assert max(abs(drive.speed_m_s) for drive in robot.app.devices.drives.values()) < AT_REST_M_S
+        await driving
 
 
 async def test_a_drive_that_hears_nothing_does_not_push_on_alone_when_the_others_are_off() -> None:
