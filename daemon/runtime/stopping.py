@@ -23,6 +23,8 @@ STOP = "stop"
 OFF = (DriveState.DISABLED, DriveState.FAULT)
 OVERRUN_S = 0.5
 """How much longer than its ramp a wheel is waited for, before its drive is switched off all the same."""
+SETTLE_S = 0.5
+"""How long a stop waits for wheels that have lost their torque; those that roll on are told of by themselves."""
 POWERLESS = (*OFF, DriveState.UNKNOWN)
 """As far as anybody knows."""
 
@@ -128,9 +130,10 @@ class Stopping:
         self._halting += 1
         try:
             await self._insist()
-            rested = await self._settled()
-            if rested and powered:
-                await self._rest_anew()
+            await self._settled()
+            if powered:
+                self.rest.begin_anew()  # wheels may settle when their torque goes
+                await self.rest.until_rest(SETTLE_S)
             if not self.latched:
                 for drive in self._drives:
                     if drive.state is DriveState.QUICK_STOP:
@@ -167,7 +170,8 @@ class Stopping:
         self._halt(Refused("the motion was stopped: the daemon is going down"))
         if powered:
             await self._stop_and_disable()
-            await self._rest_anew()
+            self.rest.begin_anew()  # wheels may settle when their torque goes
+            await self.until_rest()
 
     async def reset(self) -> None:
         """Clear the latched emergency stop and faults.
@@ -229,6 +233,10 @@ class Stopping:
     # --- rest and power ----------------------------------------------------------------------------------------
 
     @property
+    def _any_power(self) -> bool:
+        return bool(self._motions) or self.anything_enabled
+
+    @property
     def anything_enabled(self) -> bool:
         """True while any drive has its power stage on."""
         return any(drive.state not in POWERLESS for drive in self._drives)
@@ -254,30 +262,17 @@ class Stopping:
         except DeviceFault as error:
             self._on_failure(error)
 
-    async def _settled(self) -> bool:
-        rested = await self.until_rest()
-        await self._tasks.wait(MOTION)
-        return rested
-
-    @property
-    def _any_power(self) -> bool:
-        return bool(self._motions) or self.anything_enabled
-
-    async def _rest_anew(self) -> None:
-        """Return when every wheel is at rest again: wheels settle when their torque goes."""
-        self.rest.begin_anew()
+    async def _settled(self) -> None:
         await self.until_rest()
+        await self._tasks.wait(MOTION)
 
-    async def until_rest(self) -> bool:
+    async def until_rest(self) -> None:
         """Return when every wheel that can be read has been at rest for some cycles.
 
-        A wheel that does not come to rest within the time that its ramp needs is reported; waiting ends then, and
-        False is returned.
+        A wheel that does not come to rest within the time that its ramp needs is reported; waiting ends then.
         """
-        rested = await self.rest.until_rest(self._vehicle.stopping_time_s() + OVERRUN_S)
-        if not rested:
+        if not await self.rest.until_rest(self._vehicle.stopping_time_s() + OVERRUN_S):
             self._report_unrest([drive.name for drive in self._drives if abs(drive.speed_m_s) > AT_REST_M_S])
-        return rested
 
     def _report_unrest(self, moving: list[str]) -> None:
         if moving:

@@ -102,10 +102,11 @@ async def test_a_drive_that_gets_no_pdos_is_stopped_and_switched_off_by_sdo(
 ) -> None:
     async with _struck(**fault) as (robot, driving):
         await robot.call("simulation.fault", kind="lose", cob_id=0x403)
-        robot.begin(command)
+        stopping = robot.begin(command)
         await robot.until(lambda: robot.fastest_wheel_m_s < 0.01, REST_S)
         await driving
         await robot.until(lambda: not robot.network.drives["front_left"].motion.powered, 4.0)
+        await stopping
         told = [event["message"] for event in robot.app.supervisor.log.events]
         assert [words for words in told if words.startswith("node 3 (front_left) does not follow its PDOs")]
         assert robot.state == ("estop" if command == "estop" else "fault")
