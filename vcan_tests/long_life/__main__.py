@@ -20,8 +20,9 @@ from rich.table import Table
 
 from profiles.loader import load
 from vcan_tests.arguments import positive
-from vcan_tests.long_life.figures import GROWTH_H, draw, growth_per_h, table
+from vcan_tests.long_life.figures import GROWTH, draw, growth_per_h, table
 from vcan_tests.long_life.life import Life, live
+from vcan_tests.long_life.samples import Sample
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -40,28 +41,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     logging.getLogger("canhelm").addHandler(logging.NullHandler())
     logging.getLogger("canhelm").propagate = True
     logging.lastResort = None  # a robot that is broken a thousand times has a lot to say
+    samples = asked.out / "samples.jsonl"
+    samples.unlink(missing_ok=True)
     begun_s = time.monotonic()
     with TemporaryDirectory() as folder, _progress(asked.hours) as show:
-
-        def on_sample(life: Life) -> None:
-            show(life)
-            _keep(life, asked.out)
-
-        life = live(profile, asked.hours, asked.seed, Path(folder), on_sample)
+        life = live(profile, asked.hours, asked.seed, Path(folder), samples, show)
     took_s = time.monotonic() - begun_s
-    _keep(life, asked.out)
+    (asked.out / "life.json").write_text(json.dumps(asdict(life)))
     draw(life.samples, asked.out / "life.png")
     _show(life, took_s)
     return 1 if life.defects else 0
 
 
-def _keep(life: Life, out: Path) -> None:
-    """What is known so far, for those who cannot wait."""
-    (out / "life.json").write_text(json.dumps(asdict(life)))
-
-
 @contextmanager
-def _progress(hours: float) -> Iterator[Callable[[Life], None]]:
+def _progress(hours: float) -> Iterator[Callable[[Life, Sample], None]]:
     """A bar on a terminal, else a line an hour."""
     console = Console(stderr=True)
     bar = Progress(
@@ -72,21 +65,20 @@ def _progress(hours: float) -> Iterator[Callable[[Life], None]]:
         console=console,
         disable=not console.is_terminal,
     )
+    next_h = 0
     with bar:
         task = bar.add_task("life", total=hours, told="")
 
-        def told(life: Life) -> None:
-            now = life.samples[-1]
+        def told(life: Life, now: Sample) -> None:
+            nonlocal next_h
+            lived_h = now.time_s / 3600.0
             line = f"{now.faults} faults, {now.memory_kib / 1024:.1f} MiB, {len(life.defects)} defects"
-            bar.update(task, completed=now.time_s / 3600.0, told=line)
-            if not console.is_terminal and _turns_hour(life):
-                print(f"{now.time_s / 3600.0:.1f} h: {line}", file=sys.stderr, flush=True)
+            bar.update(task, completed=lived_h, told=line)
+            if not console.is_terminal and lived_h >= next_h:
+                next_h = int(lived_h) + 1
+                print(f"{lived_h:.1f} h: {line}", file=sys.stderr, flush=True)
 
         yield told
-
-
-def _turns_hour(life: Life) -> bool:
-    return len(life.samples) < 2 or life.samples[-2].time_s // 3600.0 < life.samples[-1].time_s // 3600.0
 
 
 def _show(life: Life, took_s: float) -> None:
@@ -97,9 +89,10 @@ def _show(life: Life, took_s: float) -> None:
     for row in rows:
         shown.add_row(*map(str, row.values()))
     console.print(shown)
-    for name in GROWTH_H:
+    for name in GROWTH:
         growth = growth_per_h(life.samples, name)
-        console.print(f"{name}: " + ("too short a life to tell" if growth is None else f"{growth:+.1f} an hour"))
+        told = "too short a life to tell" if growth is None else "{:+.1f} an hour, at most {:.0f}".format(*growth)
+        console.print(f"{name}: {told}")
     hours = life.samples[-1].time_s / 3600.0
     console.print(f"{hours:.2f} h in {took_s / 60.0:.1f} min; {dict(sorted(life.counts.items()))}")
     for defect in life.defects:

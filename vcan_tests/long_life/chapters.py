@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from random import Random
 from typing import Any, Final
 
 from canhelm import protocol
-from canhelm.aio import Client
 from vcan_tests.long_life.random_faults import random_fault
 from vcan_tests.long_life.stage import Stage
 
 Motion = tuple[str, dict[str, Any]]
+MOST_VISITORS, MOST_QUESTIONS = 50, 80
+"""Of a crowd, and of each one in it."""
 
 
 def random_motion(random: Random) -> Motion:
@@ -108,8 +109,8 @@ async def watch(stage: Stage) -> None:
 
 async def crowd(stage: Stage) -> None:
     """More clients at once than there are places, each with more questions than it may have, and one with nonsense."""
-    visitors = [stage.client() for _ in range(stage.random.randint(5, 50))]
-    await asyncio.gather(*(_flood(stage, visitor) for visitor in visitors))
+    visitors = stage.random.randint(5, MOST_VISITORS)
+    await _come_at_once(stage, [stage.random.randint(1, MOST_QUESTIONS) for _ in range(visitors)])
     reader, stranger = await asyncio.open_unix_connection(stage.socket)
     stranger.write(stage.random.randbytes(100) * 2000)
     with contextlib.suppress(OSError):
@@ -117,9 +118,25 @@ async def crowd(stage: Stage) -> None:
     stranger.transport.abort()
 
 
-async def _flood(stage: Stage, visitor: Client) -> None:
+async def opening(stage: Stage) -> None:
+    """The largest crowd that can be, so that no later one takes memory that was never taken before."""
+    await _come_at_once(stage, [MOST_QUESTIONS] * MOST_VISITORS)
+
+
+async def _come_at_once(stage: Stage, questions: Sequence[int]) -> None:
+    """A client for each number, with so many questions at once, of which it keeps no answer."""
+    async with stage.patience("a crowd"):  # one timer, for a virtual clock keeps those that are not needed any more
+        await asyncio.gather(*(_flood(stage, times) for times in questions))
+
+
+async def _flood(stage: Stage, times: int) -> None:
+    visitor = stage.client()
+
+    async def question() -> None:
+        await stage.answer(visitor, "status")
+
     await visitor.connect()
-    await asyncio.gather(*(stage.ask(visitor, "status") for _ in range(stage.random.randint(1, 80))))
+    await asyncio.gather(*(question() for _ in range(times)))
     await visitor.close()
 
 

@@ -14,9 +14,10 @@ from typing import Final
 from daemon.app import App, GatewayAccess
 from daemon.runs.store import RunStore
 from profiles.schema import Profile
-from vcan_tests.long_life.chapters import random_chapter
-from vcan_tests.long_life.figures import LOGS, RUNS, Sample, complaints, take_sample
+from vcan_tests.long_life.chapters import opening, random_chapter
+from vcan_tests.long_life.figures import complaints
 from vcan_tests.long_life.loop import VirtualSocketLoop
+from vcan_tests.long_life.samples import LOGS, RUNS, Sample, read_samples, take_sample, write_sample
 from vcan_tests.long_life.stage import Stage
 
 RECORD_BYTES: Final = 16_000_000
@@ -32,7 +33,7 @@ class Life:
 
     Attributes:
         seed: by which it can be lived again.
-        samples: about one a period, the first after the boot.
+        samples: about one a period, the first after the opening; only when life is over.
         counts: what has happened, by name.
         defects: what must not happen, with its time; none in a good life.
         ended_early: a person had enough of it.
@@ -58,7 +59,13 @@ class _Tracebacks(logging.Handler):
 
 
 def live(
-    profile: Profile, hours: float, seed: int, folder: Path, on_sample: Callable[[Life], None], period_s: float = 60.0
+    profile: Profile,
+    hours: float,
+    seed: int,
+    folder: Path,
+    samples: Path,
+    on_sample: Callable[[Life, Sample], None],
+    period_s: float = 60.0,
 ) -> Life:
     """Live so many virtual hours; Ctrl-C ends a life early, and it is judged as far as it went.
 
@@ -67,6 +74,7 @@ def live(
         hours: virtual time.
         seed: of everything random.
         folder: for the sockets, the record and the runs; empty.
+        samples: file to which each sample is appended at once.
         on_sample: hears of each sample.
         period_s: of the samples.
     """
@@ -75,20 +83,29 @@ def live(
     logger.addHandler(tracebacks)
     life = Life(seed)
     app = partial(make_app, profile, folder, seed)
+
+    def look() -> None:
+        sample = take_sample(folder, life.counts)
+        write_sample(samples, sample)
+        on_sample(life, sample)
+
     try:
         with asyncio.Runner(loop_factory=VirtualSocketLoop) as runner:
-            runner.run(_live(life, 3600.0 * hours, app, on_sample, period_s))
+            runner.run(_live(life, 3600.0 * hours, app, look, period_s))
     except KeyboardInterrupt:
+        if not samples.exists():
+            raise
         life.ended_early = True
     finally:
         logger.removeHandler(tracebacks)
+    life.samples = read_samples(samples)
     life.defects += tracebacks.told
     life.defects += complaints(life.samples, RECORD_BYTES, RUNS_BYTES)
     return life
 
 
 async def _live(
-    life: Life, end_s: float, make_app: Callable[[], App], on_sample: Callable[[Life], None], period_s: float
+    life: Life, end_s: float, make_app: Callable[[], App], look: Callable[[], None], period_s: float
 ) -> None:
     loop = asyncio.get_running_loop()
     app = make_app()
@@ -96,11 +113,11 @@ async def _live(
     await app.start()
     stage = Stage(app, Random(life.seed))
     await stage.recover("the boot")
+    await opening(stage)
     while True:
         await asyncio.sleep(SETTLE_S)
         life.counts, life.defects = dict(stage.counts), stage.defects
-        life.samples.append(take_sample(stage.socket.parent, stage.counts["fault"]))
-        on_sample(life)
+        look()
         if loop.time() >= end_s:
             break
         next_s = min(loop.time() + period_s, end_s)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 import math
 from collections import Counter
-from collections.abc import Awaitable
+from collections.abc import AsyncIterator, Awaitable
+from contextlib import asynccontextmanager
 from pathlib import Path
 from random import Random
 from typing import Any, Final
@@ -57,14 +58,25 @@ class Stage:
 
     async def ask(self, client: Client, method: str, /, **params: Any) -> dict[str, Any] | CanhelmError:
         """What a client is answered, be it a refusal. Raises Defect: nothing."""
+        async with self.patience(f"{method} {params}"):
+            return await self.answer(client, method, **params)
+
+    async def answer(self, client: Client, method: str, /, **params: Any) -> dict[str, Any] | CanhelmError:
+        """The same, with no end of waiting."""
         try:
-            async with asyncio.timeout(ANSWER_S):
-                return await client.call(method, **params)
+            return await client.call(method, **params)
         except CanhelmError as error:
             self.counts["refusals"] += 1
             return error
+
+    @asynccontextmanager
+    async def patience(self, asked: str) -> AsyncIterator[None]:
+        """For what has to be answered in here. Raises Defect: it is not."""
+        try:
+            async with asyncio.timeout(ANSWER_S):
+                yield
         except TimeoutError:
-            raise Defect(f"{method} {params} is not answered within {ANSWER_S:g} s") from None
+            raise Defect(f"{asked} is not answered within {ANSWER_S:g} s") from None
 
     def defect(self, told: str) -> None:
         """Write down what must not happen."""
