@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final, NamedTuple
+from typing import Final
 
 from daemon.loops import planner_axis, planner_way
 from daemon.loops.planner_axis import AxisPlan
@@ -31,6 +31,8 @@ NOTHING: Final = 1e-12
 LONGEST_CYCLE_S: Final = 10.0
 ROUNDED: Final = 1 + 1e-9
 """A velocity above its limit by this factor is at it."""
+STILL: Final = AxisPlan(0.0, ())
+"""The heading stays."""
 
 
 class Result(StrEnum):
@@ -87,7 +89,8 @@ class Tolerance:
     rate_rad_s: float = 0.1
 
 
-class Plan(NamedTuple):
+@dataclass(slots=True)
+class Plan:
     """A motion from a state to a goal.
 
     Attributes:
@@ -132,7 +135,8 @@ class Plan(NamedTuple):
         )
 
 
-class Step(NamedTuple):
+@dataclass(slots=True)
+class Step:
     """What to do for the next cycle, and why.
 
     Attributes:
@@ -224,7 +228,7 @@ def _plannable(start: PlanarState, goal: PlanarState, limits: PlanarLimits, now:
 
 def _nothing(goal: PlanarState, limits: PlanarLimits) -> Plan:
     way = planner_way.braking(0j, 1.0, 1.0)
-    return Plan(Result.INVALID, 0.0, PlanarState(), goal, limits, way, AxisPlan(0.0, ()))
+    return Plan(Result.INVALID, 0.0, PlanarState(), goal, limits, way, STILL)
 
 
 def _idle(plan: Plan) -> Step:
@@ -247,7 +251,7 @@ def _together(start: PlanarState, goal: PlanarState, limits: PlanarLimits) -> tu
     angle = math.remainder(goal.heading - start.heading, math.tau)
     fastest = planner_way.fastest(travel, begin, end, limits.speed, limits.acceleration, NEAR_M)
     if math.hypot(angle, start.rate, goal.rate) < NOTHING:
-        return fastest, AxisPlan(0.0, ((fastest.duration, 0.0),))
+        return fastest, STILL
     turn = _plain(angle), _plain(start.rate), _plain(goal.rate)
     turn_limits = limits.rate, limits.angular_acceleration
     shortest = planner_axis.least_duration(*turn, *turn_limits)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from dataclasses import dataclass
+from typing import Final
 
 ROUNDING: Final = 1e-14
 AT_ONCE_S: Final = 1e-12
 
 
-class AxisPlan(NamedTuple):
+@dataclass(slots=True)
+class AxisPlan:
     """A way in pieces of constant acceleration.
 
     Attributes:

@@ -19,7 +19,7 @@ Trial = tuple[float, complex]
 ROUNDING: Final = 1e-12
 STRAIGHT: Final = 1e-9
 """Nearer than this [rad] to straight on or straight back, two changes of velocity have no bend beside them."""
-TRIALS: Final = 20
+TRIALS: Final = range(20)
 LEAST_PART: Final = 0.1
 """Part of a Newton step below which it is taken even where it does not help."""
 CONVERGED: Final = 1e-6
@@ -52,12 +52,13 @@ def corner(
         first, last = via - start, via - end
         before, after = abs(first), abs(last)
         begun, ended = via + start, via + end
-        left = 4 * travel - 2 * (begun * before + ended * after)
-        begun /= before or 1.0
-        ended /= after or 1.0
-        by_via = 2 * (before + after) + begun * first.conjugate() + ended * last.conjugate()
+        left = 2 * travel - begun * before - ended * after
+        begun /= 2.0 * before or 1.0
+        ended /= 2.0 * after or 1.0
+        by_via = begun * first.conjugate() + ended * last.conjugate() + (before + after)
         by_mirrored = begun * first + ended * last
-        slope = (abs(by_via) - abs(by_mirrored)) * (abs(by_via) + abs(by_mirrored))
+        size, mirrored = abs(by_via), abs(by_mirrored)
+        slope = (size - mirrored) * (size + mirrored)
         return abs(left), (by_via.conjugate() * left - by_mirrored * left.conjugate()) / slope
 
     return solve(trial, guess, converged, math.sqrt(abs(travel)) + 1.0)
@@ -84,12 +85,13 @@ def bend(travel: complex, start: complex, end: complex, via: complex) -> Bend | 
     if not (first and last) or start == end:
         return None
     turn = log(last / first)
-    angle = abs(turn.imag)
+    longer, turned = turn.real, turn.imag
+    angle = abs(turned)
     if not STRAIGHT < angle < math.pi - STRAIGHT:
         return None
-    half = 1.19 * math.asinh(0.643 * math.tan(angle / 2) * (1 + 0.328 * turn.real * turn.real)) + 0.49 * angle
-    middle = turn.real * (0.41 + 0.49 / half)
-    return _bend_near(travel, start, end, math.copysign(1.0, turn.imag), complex(middle - half, middle + half))
+    half = 1.19 * math.asinh(0.643 * math.tan(angle * 0.5) * (1.0 + 0.328 * longer * longer)) + 0.49 * angle
+    middle = longer * (0.41 + 0.49 / half)
+    return _bend_near(travel, start, end, math.copysign(1.0, turned), complex(middle - half, middle + half))
 
 
 def bends(travel: complex, start: complex, end: complex) -> Iterator[Bend]:
@@ -131,13 +133,16 @@ def _bend_near(travel: complex, start: complex, end: complex, side: float, guess
         u0, u1 = ends.real, ends.imag
         if not u0 < u1:
             return NOWHERE
-        s0, r0, s1, r1, span = sinh(u0), cosh(u0), sinh(u1), cosh(u1), u1 - u0
+        s0, r0, span = sinh(u0), cosh(u0), u1 - u0
+        s1, r1 = sinh(u1), cosh(u1)
         z = 1 / (r0 - r1 + span * 1j)
-        rest = (s1 * r1 - s0 * r0 + span) / 2 * z
-        way, scale = last * s1 - first * s0 + rest + 1j, abs(z)
-        turn0, turn1 = (s0 - 1j) * z, (s1 - 1j) * z
-        less_by_u0 = (first + r0 * z) * r0 + rest * turn0 + turn0.real * way
-        more_by_u1 = (last + r1 * z) * r1 + rest * turn1 + turn1.real * way
+        rest, scale = (s1 * r1 - s0 * r0 + span) * 0.5 * z, abs(z)
+        c0, c1 = s0 + 1j, s1 + 1j
+        onward = rest + c1
+        way = first * (s1 - s0) + onward
+        turn0, turn1 = c0.conjugate() * z, c1.conjugate() * z
+        less_by_u0 = first * r0 + (rest + c0) * turn0 + turn0.real * way
+        more_by_u1 = last * r1 + onward * turn1 + turn1.real * way
         found = way * scale - mean
         left = log(missed / found)
         step, ratio = left * found / (less_by_u0 * scale), more_by_u1 / less_by_u0
@@ -150,7 +155,7 @@ def _bend_near(travel: complex, start: complex, end: complex, side: float, guess
 
 def bend_between(start: complex, end: complex, side: float, u0: float, u1: float) -> Bend:
     """The bend from u0 to u1, scaled and turned so that it leads from one velocity to the other."""
-    middle, half = (u0 + u1) / 2, 2 * sinh((u1 - u0) / 2)
+    middle, half = (u0 + u1) * 0.5, 2.0 * sinh((u1 - u0) * 0.5)
     scale = (end - start) / complex(-sinh(middle) * half, side * (u1 - u0))
     shortest = abs(scale)
     return Bend(shortest * cosh(middle) * half, start, scale / shortest, side, shortest, shortest * sinh(u0))
@@ -191,22 +196,22 @@ def keeps_limit(arc: Bend, end: complex) -> bool:
     """
     if abs(arc.velocity) + abs(end) + arc.duration <= 2.0:
         return True
-    duration, velocity, direction, side, d, begin = arc
-    back = direction.conjugate()
-    start, final = velocity * back, end * back
-    if side < 0.0:
+    d, begin, back = arc.shortest, arc.begin, arc.direction.conjugate()
+    start, final = arc.velocity * back, end * back
+    if arc.side < 0.0:
         start, final = start.conjugate(), final.conjugate()
     r0, u0 = math.hypot(begin, d), math.asinh(begin / d)
-    parts = [(begin, start, begin + duration, final)]
+    parts = [(begin, start, begin + arc.duration, final)]
     while parts:
         low, before, high, after = parts.pop()
-        highest = (abs(before) + abs(after) + high - low) / 2
-        middle = low + highest - abs(before)
+        slow = abs(before)
+        highest = (slow + abs(after) + high - low) * 0.5
+        middle = low + highest - slow
         velocity = start + complex(r0 - math.hypot(middle, d), d * (math.asinh(middle / d) - u0))
         speed = abs(velocity)
         if speed > LIMIT:
             return False
-        if highest + speed > 2 * LIMIT and min(middle - low, high - middle) > SHORTEST_PART:
+        if highest + speed > 2.0 * LIMIT and min(middle - low, high - middle) > SHORTEST_PART:
             if _crossing_speed(low, before, middle, velocity, d) > LIMIT:
                 parts.append((low, before, middle, velocity))
             if _crossing_speed(middle, velocity, high, after, d) > LIMIT:
@@ -236,7 +241,7 @@ def solve(trial: Callable[[complex], Trial], guess: complex, converged: float, l
     point, part = guess, 1.0
     try:
         error, step = trial(guess)
-        for _ in range(TRIALS):
+        for _ in TRIALS:
             length = abs(step)
             if length <= converged:
                 return point + step
@@ -247,7 +252,8 @@ def solve(trial: Callable[[complex], Trial], guess: complex, converged: float, l
             nearer = point + part * step
             left, onward = trial(nearer)
             if left < error or part < LEAST_PART:
-                point, error, step, part = nearer, left, onward, 1.0
+                point, error = nearer, left
+                step, part = onward, 1.0
             else:
                 part /= 2
     except (ArithmeticError, ValueError):

@@ -8,20 +8,13 @@ from __future__ import annotations
 
 from cmath import rect
 from collections.abc import Callable
-from math import asin, atan2, copysign, cos, log, sin, sqrt
-from typing import Final, NamedTuple
+from math import asin, atan2, copysign, cos, log1p, sin, sqrt
+from typing import Final
 
 from daemon.loops.planner_arcs import Arc, Bend, Ramp, Slide, ramp_between
 
-
-class Cruise(NamedTuple):
-    """A heading, as a unit vector, with the contacts [rad] of the changes of velocity before and after it."""
-
-    heading: complex
-    first: float
-    last: float
-
-
+Cruise = tuple[complex, float, float]
+"""A heading, as a unit vector, with the contacts [rad] of the changes of velocity before and after it."""
 Change = tuple[float, float, float, float]
 """Displacement across the cruise; its slope by the heading; the contact where the bend meets the circle of the speed
 limit, as an angle from the cruise [rad], 0 without a bend; its slope by the heading."""
@@ -36,7 +29,7 @@ ON_CIRCLE: Final = 1e-12
 """A velocity as near to the speed limit as this slides, within pi / 3 of the cruise."""
 LEAST_BENT: Final = 1e-9
 """Where a velocity is near the circle, so is the zero of the bend's slope."""
-TRIALS: Final = 30
+TRIALS: Final = range(30)
 LONGEST_STEP: Final = 0.5
 CONVERGED: Final = 1e-6
 """A Newton step as short as this leaves its square, which is none."""
@@ -57,7 +50,7 @@ def cruise(half: Half, travel: complex, start: complex, end: complex, heading: c
         heading: where the search begins, a unit vector.
     """
     first = last = 0.0
-    for _ in range(TRIALS):
+    for _ in TRIALS:
         back = heading.conjugate()
         left = travel * back
         begun, begun_slope, first_contact, first_slope = half(start * back, first)
@@ -77,7 +70,7 @@ def cruise(half: Half, travel: complex, start: complex, end: complex, heading: c
             and _settled(start, step, first_before, first)
             and (not end or _settled(end, step, last_before, last))
         ):
-            return Cruise(heading, first, last)
+            return heading, first, last
     return None
 
 
@@ -100,9 +93,10 @@ def half_turn(velocity: complex, contact: float) -> Change:
 
     The bend meets the circle tangentially at an angle p from the cruise. With b = 1 - cos p and the bend lasting over h
     of its u, the constant Hamiltonian makes along = 1 - b (cosh h + sin p sinh h), and the costate across = sin p +
-    b h cos p. h follows from the first equation; a Newton step leads from a guess of p towards the zero of the second.
-    What the change costs, its duration less its displacement along, has the costate for its gradient; turned with the
-    heading that is the displacement across, b (along cos p + across root) with root = b sinh u / (1 - along).
+    b h cos p. The first has h = log((q + root) / (1 + sin p)) with q = (1 - along) / b, root = sqrt(q^2 - cos^2 p); a
+    Newton step leads from a guess of p towards the zero of the second. What the change costs, its duration less its
+    displacement along, has the costate for its gradient; turned with the heading that is the displacement across,
+    b (along cos p + across root).
 
     Args:
         velocity: at most 1.
@@ -112,7 +106,7 @@ def half_turn(velocity: complex, contact: float) -> Change:
     across = abs(signed)
     if across < FLAT:
         return 0.0, -along * (1 - along), 0.0, 0.0
-    if along > 0.5 and 1 - along * along - across * across < ON_CIRCLE:
+    if along > 0.5 and 1.0 - along * along - across * across < ON_CIRCLE:
         turned = copysign(1.0, signed)
         return turned * (1 - along), -across, atan2(across, along), -turned
     p = contact if 0.0 < contact < STEEPEST else across * (0.87 + 0.08 * along - across * (0.74 - 0.69 * across))
@@ -120,32 +114,28 @@ def half_turn(velocity: complex, contact: float) -> Change:
     if s > across:
         p, s = asin(across), across
     c = cos(p)
-    b = s * s / (1 + c)
-    q, root, h = _bend_to(along, c, s, b)
+    b = s * s / (1.0 + c)
+    q = (1.0 - along) / b
+    if q < 1.0:
+        q = 1.0
+    root = sqrt((q - 1.0) * (q + 1.0) + s * s)
+    h = log1p((q - 1.0 + root - s) / (1.0 + s))
     steepness, tilt = q / root, along - across * c / root
-    bent = 1 + s * (h - steepness)
+    bent = 1.0 + s * (h - steepness)
     if bent < LEAST_BENT:
         bent = LEAST_BENT
-    miss, turning, narrow = (across - s - b * c * h) / bent, tilt / bent, 2 * c - 1
-    displaced = b * (along * c + across * root) + s * tilt * miss
-    slope = b * (across * c - along * root) - across * across * steepness - s * tilt * turning
+    miss, turning, narrow = (across - s - b * c * h) / bent, tilt / bent, 2.0 * c - 1.0
+    tilted = s * tilt
+    displaced = b * (along * c + across * root) + tilted * miss
+    slope = b * (across * c - along * root) - across * across * steepness - tilted * turning
     if signed < 0.0:
         return -displaced, slope, p + miss / narrow, turning / narrow
     return displaced, slope, p + miss / narrow, -turning / narrow
 
 
-def _bend_to(along: float, c: float, s: float, b: float) -> tuple[float, float, float]:
-    """q = (1 - along) / b, root = sqrt(q^2 - c^2), h = log((q + root) / (1 + s)); q / c is cosh u at the start."""
-    q = (1 - along) / b
-    if q < 1.0:
-        q = 1.0
-    root = sqrt((q - 1) * (q + 1) + s * s)
-    return q, root, log((q + root) / (1 + s))
-
-
 def ramp_arcs(travel: complex, start: complex, end: complex, found: Cruise) -> list[Arc]:
     """Straight change of velocity, cruise, straight change of velocity; none if the cruise would lead back."""
-    fast = found.heading
+    fast, _, _ = found
     first, last = ramp_between(start, fast), ramp_between(fast, end)
     left = travel - ((start + fast) * first.duration + (fast + end) * last.duration) / 2
     length = (left * fast.conjugate()).real
@@ -170,12 +160,14 @@ def _turn(velocity: complex, heading: complex, contact: float, toward: float) ->
     along, across = relative.real, relative.imag
     if not contact:
         ramp = ramp_between(velocity, heading) if toward > 0 else ramp_between(heading, velocity)
-        return [ramp], (1 - along * along) / 2
+        return [ramp], (1.0 - along * along) * 0.5
     c, s = cos(contact), sin(contact)
-    b = s * s / (1 + c)
-    q, root, h = _bend_to(along, c, s, b)
+    b = s * s / (1.0 + c)
+    q = max(1.0, (1.0 - along) / b)
+    root = sqrt((q - 1.0) * (q + 1.0) + s * s)
     bending = b * (root - s)
-    forward = bending - b * b * (root * q + c * c * h - s) / 2 + s
+    # From half_turn, with b c h = across - s.
+    forward = bending - b * (b * (root * q - s) + c * (abs(across) - s)) * 0.5 + s
     side = -toward * copysign(1.0, across)
     meeting = heading * complex(c, copysign(s, across))
     if toward > 0:

@@ -52,7 +52,7 @@ def fastest_way(travel: complex, start: complex, end: complex, near: float = 0.0
         return "line", chain(start, straight)
     if abs((start + end) / 2 * abs(end - start) - travel) <= near:
         return "ramp", chain(start, [ramp_between(start, end)])
-    precise = PRECISE * (1 + abs(travel))
+    precise = PRECISE * (1.0 + abs(travel))
     best: tuple[str, Chain] | None = None
     for shape, arcs, surely in _ways(travel, start, end):
         way = chain(start, arcs)
@@ -66,7 +66,7 @@ def fastest_way(travel: complex, start: complex, end: complex, near: float = 0.0
 
 def _ways(travel: complex, start: complex, end: complex) -> Iterator[Shaped]:
     """Ways that may exist, the likely ones first."""
-    size, begun, ended = abs(travel), abs(start), abs(end)
+    size, begun = abs(travel), abs(start)
     if size > FAR:
         toward = travel / size
         left = travel - ((start + toward) * abs(toward - start) + (toward + end) * abs(toward - end)) / 2
@@ -74,34 +74,34 @@ def _ways(travel: complex, start: complex, end: complex) -> Iterator[Shaped]:
     if begun > CRUISES:
         yield from _turns(travel, start, end, start)
     known: list[complex] = []
-    middle = (start + end) / 2
-    peak = math.sqrt(size + (begun * begun + ended * ended) / 2)
+    middle, ended = (start + end) / 2, abs(end)
+    peak = math.sqrt(size + (begun * begun + ended * ended) * 0.5)
     toward = travel - peak * middle
     for guess in toward * (peak / (abs(toward) or 1.0)), travel * (peak / (size or 1.0)), middle, -middle:
         via = corner(travel, start, end, guess, ROUGH * peak)
         if via is None or (known and min(abs(via - other) for other in known) <= SAME):
             continue
         known.append(via)
-        yield from _ways_near(travel, start, end, via)
+        speed = abs(via)
+        if speed > LIKELY_CRUISE:
+            yield from _turns(travel, start, end, via)
+        if arc := bend(travel, start, end, via):
+            yield from _bend(arc, travel, end)
+        if MAY_CRUISE < speed <= LIKELY_CRUISE:
+            yield from _turns(travel, start, end, via)
+        yield from _ways_by(travel, start, end, via, not arc)
     for arc in bends(travel, start, end):
         yield from _bend(arc, travel, end)
 
 
-def _ways_near(travel: complex, start: complex, end: complex, via: complex) -> Iterator[Shaped]:
-    """Ways like two straight changes of velocity by a corner."""
-    speed = abs(via)
-    if speed > LIKELY_CRUISE:
-        yield from _turns(travel, start, end, via)
-    if arc := bend(travel, start, end, via):
-        yield from _bend(arc, travel, end)
-    if MAY_CRUISE < speed <= LIKELY_CRUISE:
-        yield from _turns(travel, start, end, via)
+def _ways_by(travel: complex, start: complex, end: complex, via: complex, unbent: bool) -> Iterator[Shaped]:
+    """Straight changes of velocity by the exact corner, or with a cruise; the bend near it, if there was none yet."""
     exact = corner(travel, start, end, via)
-    if exact is not None and not arc and (arc := bend(travel, start, end, exact)):
+    if exact is not None and unbent and (arc := bend(travel, start, end, exact)):
         yield from _bend(arc, travel, end)
     if exact is not None and abs(exact) <= 1:
         yield "ramps", ramps(start, end, exact), False
-    elif speed and (found := cruise(half_ramp, travel, start, end, via / speed)):
+    elif via and (found := cruise(half_ramp, travel, start, end, via / abs(via))):
         yield "ramps", ramp_arcs(travel, start, end, found), False
 
 
@@ -117,7 +117,8 @@ def _turns(travel: complex, start: complex, end: complex, heading: complex) -> l
     """
     found = cruise(half_turn, travel, start, end, heading / abs(heading)) if heading else None
     if found and (arcs := turn_arcs(travel, start, end, found)):
-        return [("turns", arcs, (travel * found.heading.conjugate()).real > 0.0)]
+        heading, _, _ = found
+        return [("turns", arcs, (travel * heading.conjugate()).real > 0.0)]
     return []
 
 

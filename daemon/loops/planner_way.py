@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from typing import Final, NamedTuple
+from dataclasses import dataclass
+from typing import Final
 
 from daemon.loops.planner_arcs import Chain, Place, Ramp, chain, ramp_between
 from daemon.loops.planner_paths import fastest_way, stop_and_go
@@ -18,7 +19,8 @@ GENTLEST: Final = 1e-5
 The unit of length grows as the acceleration shrinks, and a way may miss its goal by a share of that unit."""
 
 
-class Way(NamedTuple):
+@dataclass(slots=True)
+class Way:
     """Arcs one after the other.
 
     Attributes:
@@ -26,14 +28,17 @@ class Way(NamedTuple):
         speed: limit in force [m/s].
         acceleration: limit in force [m/s2].
         chain: the arcs, in units of the limits.
-        duration: [s].
     """
 
     shape: str
     speed: float
     acceleration: float
     chain: Chain
-    duration: float
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return self.chain.times[-1] * self.speed / self.acceleration
 
     def case(self, time: float) -> str:
         """Name of the arc in force."""
@@ -42,11 +47,11 @@ class Way(NamedTuple):
 
     def at(self, time: float) -> Place:
         """Displacement [m] and velocity [m/s] at a time [s]; after the end the last velocity is held."""
-        _, speed, acceleration, (arcs, places, times), _ = self
+        speed, acceleration, arcs = self.speed, self.acceleration, self.chain.arcs
         now = time * acceleration / speed
         index = self._index(now)
-        displacement, velocity = places[index]
-        since = now - times[index]
+        displacement, velocity = self.chain.places[index]
+        since = now - self.chain.times[index]
         if index < len(arcs):
             further, velocity = arcs[index].at(since)
         else:
@@ -72,18 +77,19 @@ def fastest(travel: complex, start: complex, end: complex, speed: float, acceler
     length = speed * speed / acceleration
     goal, raw, final = travel / length, start / speed, end / speed
     if abs(raw) <= 1.0 and abs(final) <= 1.0:
-        return _way(fastest_way(goal, raw, final, near / length), speed, acceleration)
+        shape, arcs = fastest_way(goal, raw, final, near / length)
+        return Way(shape, speed, acceleration, arcs)
     begin = _within(raw)
     slowing = ramp_between(raw, begin)
     braked, _ = slowing.at(slowing.duration)
     shape, onward = fastest_way(goal - braked, begin, _within(final), near / length)
-    return _way((shape, chain(raw, [slowing, *onward.arcs])), speed, acceleration)
+    return Way(shape, speed, acceleration, chain(raw, [slowing, *onward.arcs]))
 
 
 def braking(start: complex, speed: float, acceleration: float) -> Way:
     """The straight way to rest."""
     raw = start / speed
-    return _way(("stop", chain(raw, [ramp_between(raw, 0j)])), speed, acceleration)
+    return Way("stop", speed, acceleration, chain(raw, [ramp_between(raw, 0j)]))
 
 
 def lasting(way: Way, travel: complex, start: complex, end: complex, duration: float) -> Way:
@@ -121,15 +127,10 @@ def _with_a_rest(way: Way, travel: complex, start: complex, end: complex, durati
     brake, *onward = stop_and_go(travel * acceleration / (speed * speed), raw, end / speed)
     unrested = math.fsum(arc.duration for arc in (brake, *onward))
     rest = Ramp(max(0.0, duration * acceleration / speed - unrested), 0j)
-    return _way(("stop and go", chain(raw, [brake, rest, *onward])), speed, acceleration)
+    return Way("stop and go", speed, acceleration, chain(raw, [brake, rest, *onward]))
 
 
 def _within(velocity: complex) -> complex:
     """The velocity, in units of the limit, shortened to the limit."""
     length = abs(velocity)
     return velocity / length if length > 1 else velocity
-
-
-def _way(shaped: tuple[str, Chain], speed: float, acceleration: float) -> Way:
-    shape, arcs = shaped
-    return Way(shape, speed, acceleration, arcs, arcs.times[-1] * speed / acceleration)
