@@ -31,6 +31,7 @@ class Load:
         wire_share: share of the time that the wire was busy, guarding included.
         daemon_us: the daemon's time in a cycle, the least of several measurements; None where it was not seen: more
             than one step in ten was begun by the clock, because readings were late.
+        boot_s: from the daemon's start until all nodes are operational.
     """
 
     cycles: int
@@ -40,6 +41,7 @@ class Load:
     bits: float
     wire_share: float
     daemon_us: float | None
+    boot_s: float
 
 
 class CycleBits:
@@ -60,16 +62,18 @@ def load_of(profile: Profile, scene: Scene, seconds: float, settle_s: float) -> 
 
 
 async def _load_of(profile: Profile, scene: Scene, seconds: float, settle_s: float) -> Load:
-    share = DaemonShare()
+    share, loop = DaemonShare(), asyncio.get_running_loop()
+    begun_s = loop.time()
     with share.of_ticks():
         async with booted(profile) as robot:
+            boot_s = loop.time() - begun_s
             share.of_frames(robot.app)
             await begin(robot, scene)
             await asyncio.sleep(settle_s)
-            return await _watch(robot, share, seconds)
+            return await _watch(robot, share, seconds, boot_s)
 
 
-async def _watch(robot: DemoRobot, share: DaemonShare, seconds: float) -> Load:
+async def _watch(robot: DemoRobot, share: DaemonShare, seconds: float, boot_s: float) -> Load:
     app, medium, counted, spans_us = robot.app, robot.app.medium, CycleBits(), []
     assert medium is not None
     app.bus.taps.append(counted.see)
@@ -82,7 +86,7 @@ async def _watch(robot: DemoRobot, share: DaemonShare, seconds: float) -> Load:
     cycles, late, incomplete, lost = (now - then for now, then in zip(_counts(robot), before, strict=True))
     wire_share = (medium.busy_s - busy_s) / (TIMES * span_s)
     daemon_us = min(spans_us) if incomplete <= UNSEEN_SHARE * cycles else None
-    return Load(cycles, late, incomplete, lost, counted.bits / cycles, wire_share, daemon_us)
+    return Load(cycles, late, incomplete, lost, counted.bits / cycles, wire_share, daemon_us, boot_s)
 
 
 def _counts(robot: DemoRobot) -> tuple[int, int, int, int]:

@@ -6,7 +6,6 @@ import asyncio
 
 from canhelm.errors import Aborted, NodeAbsent, Refused, Timeout
 from drivers.canopen.codes import NmtCommand
-from drivers.canopen.configuration import BREATH_S
 from drivers.canopen.master import Master
 from drivers.canopen.scan import BusWatch
 from drivers.epos.commissioning import SAVE, SAVE_TIMEOUT_S
@@ -44,7 +43,7 @@ async def _require_alone(master: Master, node: int) -> None:
     with BusWatch(master.bus) as watch:
         for _ in range(QUESTIONS):
             await sdo.read_int(OBJECTS["statusword"])
-            await asyncio.sleep(BREATH_S)
+            await master.pacing.give_way()
     if watch.of(node).two_nodes:
         remedy = "take one of them from the bus (its CAN or power plug), then again"
         raise Refused(f"two drives have node id {node}: both would get the new one", node=node, remedy=remedy)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Iterable
 
 from canhelm.errors import Aborted, DeviceFault, NodeAbsent, Refused, Timeout
 from drivers.canopen.codes import NmtCommand, NmtState
@@ -29,8 +30,8 @@ _RESETS = (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION)
 STATE_WORDS = {int(state): state.name.lower().replace("_", "-") for state in NmtState}
 
 
-class _Restarted(Exception):
-    """The node restarted while it was configured."""
+class _Interrupted(Exception):
+    """The node must be configured anew. Args: why."""
 
 
 class NodeBoot:
@@ -99,8 +100,8 @@ class NodeBoot:
                 NodeState.CONFIGURING, "waiting", "warning", self._failed_step(error.message), error.remedy or ""
             )
             await self._pause(FIRST_PAUSE_S)
-        except _Restarted:
-            self._fail(NodeState.CONFIGURING, "waiting", "warning", self._failed_step("it restarted"), "")
+        except _Interrupted as why:
+            self._fail(NodeState.CONFIGURING, "waiting", "warning", self._failed_step(str(why)), "")
         else:
             self._ready()
             await self._gone.wait()
@@ -144,24 +145,33 @@ class NodeBoot:
         self._gone.clear()
         device = self._device
         device.node_state = NodeState.CONFIGURING
+        device.status_sentence = f"{self._who}: waiting until other nodes are configured"
+        async with self._master.pacing.turns:
+            deadline_s = asyncio.get_running_loop().time() + self._master.network.boot_deadline_s
+            await self._take_steps(device.boot_steps(), deadline_s)
         start = Step("starting it", self._start)
         guard = Step("waiting for its first guarding answer", self._first_guarding_answer)
+        await self._take_steps((start, guard, *device.start_steps()), deadline_s)
+
+    async def _take_steps(self, steps: Iterable[Step], deadline_s: float) -> None:
+        """One step after the other until a loop time. Raises Timeout then."""
         try:
-            async with asyncio.timeout(self._master.network.boot_deadline_s):
-                for step in (*device.boot_steps(), start, guard, *device.start_steps()):
-                    device.status_sentence = f"{self._who}: {step.name}"
+            async with asyncio.timeout_at(deadline_s):
+                for step in steps:
+                    self._device.status_sentence = f"{self._who}: {step.name}"
+                    await self._master.pacing.give_way()
                     await step.run()
                     if self._restarted:
-                        raise _Restarted
+                        raise _Interrupted("it restarted")
+                    if self._held:
+                        raise _Interrupted("it is held by command")
         except TimeoutError:
-            deadline_s = self._master.network.boot_deadline_s
+            limit_s = self._master.network.boot_deadline_s
             remedy = "check the bus load and the control cycle with `canhelm status`"
-            raise Timeout(
-                f"not done {deadline_s:g} s after its boot-up began", node=self._node, remedy=remedy
-            ) from None
+            raise Timeout(f"not done {limit_s:g} s after its boot-up began", node=self._node, remedy=remedy) from None
         except NodeAbsent:
             if self._restarted:
-                raise _Restarted from None
+                raise _Interrupted("it restarted") from None
             raise
 
     async def _start(self) -> None:

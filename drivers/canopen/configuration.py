@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Iterable
 from typing import NamedTuple
 
 from canhelm.errors import Refused
 from drivers.canopen.objects import ObjectDef
+from drivers.canopen.pacing import Pacing
 from drivers.canopen.sdo import SdoClient
-
-BREATH_S = 0.001
-"""Pause after each object: the identifiers of guarding have the lowest priority, and must get through all the same."""
 
 DIFFERS = "switch the device off and on; if it happens again, check its type and firmware"
 
@@ -33,25 +30,28 @@ class Configuration:
     Args:
         sdo: the node's client.
         who: the node for people.
+        pacing: when its transfers may begin.
 
     Attributes:
         written: last value written to each object.
     """
 
-    def __init__(self, sdo: SdoClient, who: str) -> None:
+    def __init__(self, sdo: SdoClient, who: str, pacing: Pacing) -> None:
         self.written: dict[ObjectDef, int] = {}
         self._sdo = sdo
         self._who = who
+        self._pacing = pacing
 
     async def write(self, settings: Iterable[tuple[ObjectDef, int]]) -> None:
         """Write values in their order. Raises NodeAbsent, Timeout or Aborted."""
         for entry, value in settings:
+            await self._pacing.give_way()
             await self._sdo.write(entry, value)
             self.written[entry] = value
-            await asyncio.sleep(BREATH_S)
 
     async def expect(self, entry: ObjectDef, expected: int, remedy: str, mask: int = -1) -> None:
         """Read one object and compare it under a mask. Raises Refused where it differs."""
+        await self._pacing.give_way()
         found = await self._sdo.read_int(entry)
         if found & mask != expected & mask:
             raise Refused(
@@ -67,17 +67,16 @@ class Configuration:
         """Read objects and tell which differ. Raises NodeAbsent, Timeout, Aborted or DeviceFault."""
         different: list[Difference] = []
         for entry, expected in settings:
+            await self._pacing.give_way()
             found = await self._sdo.read_int(entry)
             if found != expected:
                 different.append(Difference(entry, found, expected))
-            await asyncio.sleep(BREATH_S)
         return different
 
     async def verify(self) -> None:
         """Read everything back that was written. Raises Refused at the first object that differs."""
         for entry, expected in self.written.items():
             await self.expect(entry, expected, DIFFERS)
-            await asyncio.sleep(BREATH_S)
 
 
 def _words(value: int) -> str:

@@ -15,6 +15,7 @@ from collections.abc import Callable
 
 from drivers.bus.contract import RTR_FLAG
 from drivers.canopen.nmt import ERROR_CONTROL_COB_ID
+from drivers.canopen.pacing import Pacing
 
 REPEAT_AFTER = 0.4
 LOST_AFTER = 0.8
@@ -32,6 +33,7 @@ class Guard:
         guard_time_s: time between two requests.
         request: sends a remote frame with the COB-ID it is given.
         on_lost: called once with the time since the last sign of life.
+        pacing: told from when on and how long an answer is awaited.
         patience_s: the node is not given up sooner than this after a request.
     """
 
@@ -41,12 +43,14 @@ class Guard:
         guard_time_s: float,
         request: Callable[[int], None],
         on_lost: Callable[[float], None],
+        pacing: Pacing,
         patience_s: float = 0.0,
     ) -> None:
         self.node = node
         self.guard_time_s = guard_time_s
         self._request = request
         self._on_lost = on_lost
+        self._pacing = pacing
         self._lost_s = max(LOST_AFTER * guard_time_s, patience_s)
         self._armed = False
         self._called_s = 0.0
@@ -60,7 +64,7 @@ class Guard:
         """Guard from now on; the first request goes out with the next call of :meth:`due`."""
         self._armed = True
         self._called_s = self._next_s = self._alive_s = now_s
-        self._asked_s = None
+        self._await_no_more()
         self._toggle = None
 
     @property
@@ -71,6 +75,7 @@ class Guard:
     def disarm(self) -> None:
         """Ask no more."""
         self._armed = False
+        self._await_no_more()
 
     def due(self, now_s: float) -> None:
         """Send what is due; called by each good control cycle."""
@@ -91,6 +96,7 @@ class Guard:
 
     def _ask(self, now_s: float) -> None:
         self._asked_s = now_s
+        self._pacing.guard_asked(self.node)
         self._next_s = (math.floor(now_s / self.guard_time_s + EARLY) + 1) * self.guard_time_s
         self._repeated = False
         self._request(RTR_FLAG | ERROR_CONTROL_COB_ID + self.node)
@@ -98,7 +104,7 @@ class Guard:
     def lose(self, now_s: float) -> None:
         """The node is known to be silent; its guard reports it lost."""
         if self._armed:
-            self._armed = False
+            self.disarm()
             self._on_lost(now_s - self._alive_s)
 
     def answer(self, toggle: int, now_s: float) -> bool:
@@ -106,5 +112,9 @@ class Guard:
         alternates = toggle != self._toggle
         self._toggle = toggle
         self._alive_s = now_s
-        self._asked_s = None
+        self._await_no_more()
         return alternates
+
+    def _await_no_more(self) -> None:
+        self._asked_s = None
+        self._pacing.guard_over(self.node)

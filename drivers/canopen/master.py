@@ -14,6 +14,7 @@ from drivers.canopen.guarding import REPEAT_AFTER, Guard
 from drivers.canopen.lss import ANSWER_COB_ID as LSS_ANSWER_COB_ID
 from drivers.canopen.lss import LssMaster
 from drivers.canopen.nmt import NMT_COB_ID, SYNC_COB_ID, make_nmt
+from drivers.canopen.pacing import Pacing
 from drivers.canopen.sdo import ANSWER_COB_ID, SdoClient
 from profiles.schema import Network
 
@@ -50,6 +51,7 @@ class Master:
 
     Attributes:
         counters: what was dropped.
+        pacing: when transfers may begin that configure nodes.
         lss: sets node ids and bit rates of devices.
         names: how people call the nodes, by node id.
         on_event: told of everything that happens to a node.
@@ -59,6 +61,7 @@ class Master:
         self.bus = bus
         self.network = network
         self.counters = CanopenCounters()
+        self.pacing = Pacing(bus.bit_rate)
         self.names: dict[int, str] = {}
         self.on_event: Callable[[NodeEvent], None] | None = None
         self._period_s = 1.0 / network.cycle_hz
@@ -155,7 +158,7 @@ class Master:
     def guard(self, node: int, on_lost: Callable[[float], None]) -> Guard:
         """The guard of a node, not armed yet; ``on_lost`` gets the time since its last sign of life."""
         guard_time_s, patience_s = self.network.guard_time_ms / 1e3, self.network.patience_s
-        guard = Guard(node, guard_time_s, self._send_guard_request, on_lost, patience_s)
+        guard = Guard(node, guard_time_s, self._send_guard_request, on_lost, self.pacing, patience_s)
         self._guards[node] = guard
         return guard
 

@@ -94,7 +94,7 @@ class Cia406Encoder(CanopenDevice):
 
     def boot_steps(self) -> tuple[Step, ...]:
         """Configuration in pre-operational."""
-        configuration = Configuration(self.sdo, self.who)
+        configuration = Configuration(self.sdo, self.who, self.master.pacing)
 
         async def write_guarding() -> None:
             network = self.master.network

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from canhelm.errors import Aborted, DeviceFault, Interlock, NodeAbsent, Timeout
 from drivers.canopen.codes import NmtCommand
-from drivers.canopen.configuration import BREATH_S, Configuration
+from drivers.canopen.configuration import Configuration
 from drivers.canopen.objects import ObjectDef
 from drivers.canopen.pdo import Settings
 from drivers.contract import NodeState
@@ -44,6 +44,7 @@ class Commissioning:
     def __init__(self, drive: EposDrive) -> None:
         self._drive = drive
         self._sdo = drive.sdo
+        self._pacing = drive.master.pacing
         self._taken_out = False
 
     async def __aenter__(self) -> Commissioning:
@@ -68,7 +69,7 @@ class Commissioning:
             except Aborted as error:
                 if entry.firmware == "2011h" or error.value not in ABSENT:
                     raise
-            await asyncio.sleep(BREATH_S)
+            await self._pacing.give_way()
         return found
 
     async def take_out(self) -> dict[ObjectDef, int]:
@@ -97,7 +98,7 @@ class Commissioning:
 
     async def write(self, settings: Settings) -> None:
         """Write settings in their order and read them back. Raises Refused where one did not take."""
-        configuration = Configuration(self._sdo, self._drive.who)
+        configuration = Configuration(self._sdo, self._drive.who, self._pacing)
         await configuration.write(settings)
         await configuration.verify()
 
@@ -129,7 +130,7 @@ class Commissioning:
 
     async def require_kept(self, wanted: Mapping[ObjectDef, int]) -> None:
         """Raise DeviceFault unless the settings have outlived the restart."""
-        lost = await Configuration(self._sdo, self._drive.who).differences(wanted.items())
+        lost = await Configuration(self._sdo, self._drive.who, self._pacing).differences(wanted.items())
         if lost:
             raise DeviceFault(
                 f"{self._drive.who} did not keep its settings: {'; '.join(map(str, lost))}",

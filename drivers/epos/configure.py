@@ -7,6 +7,7 @@ import asyncio
 from canhelm.errors import DeviceFault, Refused
 from drivers.canopen.configuration import Configuration
 from drivers.canopen.device import Step
+from drivers.canopen.master import Master
 from drivers.canopen.objects import ObjectDef
 from drivers.canopen.pdo import Settings
 from drivers.canopen.sdo import SdoClient
@@ -17,7 +18,7 @@ from drivers.epos.objects import OBJECTS
 from drivers.epos.outputs import OutputBits
 from drivers.epos.parameters import guarding_plan, parameter_plan, pdo_plan, start_up_plan
 from drivers.epos.state_machine import Command, state_of
-from profiles.schema import DriveConfig, Network
+from profiles.schema import DriveConfig
 
 DEVICE_TYPE = 0x0020_0192
 VENDOR_MAXON = 0xFB
@@ -38,7 +39,7 @@ class EposSetup:
 
     Args:
         config: the drive in the profile.
-        network: timing.
+        master: of its bus.
         sdo: the node's client.
         who: the node for people.
         outputs: its digital outputs, which carry the brakes.
@@ -48,19 +49,19 @@ class EposSetup:
     def __init__(
         self,
         config: DriveConfig,
-        network: Network,
+        master: Master,
         sdo: SdoClient,
         who: str,
         outputs: OutputBits,
         stop_input: EmergencyStopInput | None,
     ) -> None:
         self._config = config
-        self._network = network
+        self._network = master.network
         self._sdo = sdo
         self._who = who
         self._outputs = outputs
         self._stop_input = stop_input
-        self._written = Configuration(sdo, who)
+        self._written = Configuration(sdo, who, master.pacing)
         self._firmware = 0
 
     @property

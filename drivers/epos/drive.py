@@ -317,7 +317,7 @@ class EposDrive(CanopenDevice):
 
     def boot_steps(self) -> tuple[Step, ...]:
         """Configuration in pre-operational; see :class:`drivers.epos.configure.EposSetup`."""
-        self._setup = EposSetup(self.config, self.master.network, self.sdo, self.who, self.outputs, self._stop_input)
+        self._setup = EposSetup(self.config, self.master, self.sdo, self.who, self.outputs, self._stop_input)
         return self._setup.steps()
 
     @property

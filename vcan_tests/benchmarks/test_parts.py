@@ -55,7 +55,7 @@ def test_a_rate_at_which_nothing_boots_is_shown_as_such() -> None:
 
 
 def test_a_rate_at_which_the_daemon_s_time_is_not_seen_says_why() -> None:
-    crowded = Load(200, 0, 200, 0, 1100.0, 0.97, None)
+    crowded = Load(200, 0, 200, 0, 1100.0, 0.97, None, 0.3)
     assert rates.cost_row(850.0, crowded)[1:3] == ("not seen: readings come late", None)
 
 

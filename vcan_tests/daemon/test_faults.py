@@ -19,8 +19,9 @@ from vcan_tests.robot import Robot, running_robot
 MAX2D = load("max2d").profile
 REST_S = 1.5
 """From a fault at 0.4 m/s until every wheel stands: noticing it, and the quick-stop ramp, with a margin."""
-TOLD_S, SILENT_S, GUARDED_S = 0.011, 0.071, 0.13
-"""Until a fault is noticed: that a device tells itself, that it is silent, that it answers no guarding."""
+TOLD_S, SILENT_S, GUARDED_S = 0.011, 0.071, 0.19
+"""Until a fault is noticed: that a device tells itself, that it is silent, that it answers no guarding, right after an
+answer."""
 LIFE_TIME_S, SWING_S = 0.3, 0.05
 """Until a drive that hears nothing begins its ramp by itself; and what a wheel swings after it."""
 RAMP_S = 0.4 / min(drive.quick_stop_m_s2 for drive in MAX2D.drives.values())

@@ -8,6 +8,7 @@ import pytest
 
 from drivers.bus.contract import RTR_FLAG
 from drivers.canopen.guarding import Guard
+from drivers.canopen.pacing import Pacing
 from drivers.contract import NodeState
 from vcan_tests.drivers.bench import bench
 
@@ -19,7 +20,7 @@ class Watch:
         self.requests: list[float] = []
         self.lost_after: list[float] = []
         self.now_s = armed_s
-        self.guard = Guard(3, 0.1, self._request, self.lost_after.append)
+        self.guard = Guard(3, 0.1, self._request, self.lost_after.append, Pacing(1_000_000))
         self.guard.arm(armed_s)
 
     def _request(self, can_id: int) -> None:

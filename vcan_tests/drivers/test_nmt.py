@@ -39,6 +39,17 @@ async def test_a_stopped_node_is_held_until_it_is_started() -> None:
         assert b.drive().node_state is NodeState.READY
 
 
+async def test_a_node_that_is_held_while_it_is_configured_is_not_started() -> None:
+    async with bench(powered=False) as b:
+        b.network.power_on()
+        await asyncio.sleep(0.16)
+        drive = b.drive("rear_left")
+        assert drive.node_state is NodeState.CONFIGURING
+        b.master.nmt(NmtCommand.ENTER_PRE_OPERATIONAL, drive.node)
+        await asyncio.sleep(1.0)
+        assert "held by command" in drive.status_sentence
+
+
 async def test_a_start_of_all_starts_no_node_that_is_not_configured() -> None:
     async with bench(powered=False) as b:
         frames: list[tuple[int, bytes]] = []
