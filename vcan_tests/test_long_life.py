@@ -94,6 +94,10 @@ def test_less_than_an_hour_of_full_logs_is_too_short_to_tell_growth() -> None:
     assert growth_per_h(lived(1.4, memory_kib=9e9), "memory_kib") is None
 
 
+def test_fewer_looks_than_parts_are_too_few_to_tell_growth() -> None:
+    assert growth_per_h(lived(12.0, memory_kib=9e9)[::100], "memory_kib") is None
+
+
 def test_logs_that_are_never_full_leave_nothing_to_judge() -> None:
     samples = [replace(one, log_bytes=minute) for minute, one in enumerate(lived(3.0, memory_kib=9e9))]
     assert growth_per_h(samples, "memory_kib") is None

@@ -14,6 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import msgspec
+from rich.box import SIMPLE
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
@@ -85,7 +86,7 @@ def _show(life: Life, took_s: float) -> None:
     """Table, counts and defects."""
     console = Console()
     rows = table(life.samples)
-    shown = Table(*rows[0])
+    shown = Table(*rows[0], box=SIMPLE, padding=(0, 1, 0, 0))
     for row in rows:
         shown.add_row(*map(str, row.values()))
     console.print(shown)

@@ -50,7 +50,7 @@ def growth_per_h(samples: Sequence[Sample], field: str) -> tuple[float, float] |
     """
     full = judged(samples)
     judged_h = (full[-1].time_s - full[0].time_s) / 3600.0 if full else 0.0
-    if judged_h < JUDGED_H:
+    if judged_h < JUDGED_H or len(full) < PARTS:
         return None
     parts = np.array_split(np.array([(one.time_s / 3600.0, getattr(one, field)) for one in full]), PARTS)
     growth_h = np.polyfit([part[:, 0].mean() for part in parts], [part[:, 1].min() for part in parts], 1)[0]
@@ -94,7 +94,7 @@ def _row(sample: Sample) -> dict[str, Any]:
         "objects": sample.objects,
         "blocks": sample.blocks,
         "tasks": sample.tasks,
-        "descriptors": sample.descriptors,
+        "files": sample.descriptors,
         "record MB": f"{sample.log_bytes / 1e6:.1f}",
         "runs MB": f"{sample.run_bytes / 1e6:.1f}",
         "faults": sample.faults,
