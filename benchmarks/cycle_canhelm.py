@@ -13,6 +13,7 @@ from benchmarks.cycle_link import Link, make_pair
 from benchmarks.cycle_robot import SocketRobot
 from daemon.runs.store import RunStore
 from daemon.runtime.cycle import Cycle
+from daemon.runtime.gathering import Gathering
 from daemon.runtime.paired_steer_vehicle import PairedSteerVehicle
 from daemon.runtime.recorder import BusRecorder
 from daemon.runtime.run_recorder import RunRecorder
@@ -86,11 +87,11 @@ class CanhelmCycle:
         self.recorder: BusRecorder | None = None
         self.runs: RunRecorder | None = None
         if recording:
-            folder = Path(self._folder.name)
-            self.recorder = BusRecorder(self.bus, folder / "all.log", profile.name, self.supervisor.log)
+            folder, gathering = Path(self._folder.name), Gathering(self.bus)
+            self.recorder = BusRecorder(gathering, folder / "all.log", profile.name, self.supervisor.log)
             self.recorder.start()
             store = RunStore(folder / "runs")
-            self.runs = RunRecorder(store, self.supervisor, self.bus, profile, "socketcan:bench0")
+            self.runs = RunRecorder(store, self.supervisor, gathering, profile, "socketcan:bench0")
             self.runs.start()
         await self.master.start()
         self.cycle.start()

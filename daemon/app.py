@@ -14,6 +14,7 @@ from canhelm.errors import BusOff
 from daemon.runs.store import RunStore
 from daemon.runtime.commands import Commands
 from daemon.runtime.cycle import Cycle
+from daemon.runtime.gathering import Gathering
 from daemon.runtime.localising import Localiser
 from daemon.runtime.log_forms import CANDUMP, LogForm
 from daemon.runtime.recorder import LIMIT_BYTES, BusRecorder
@@ -142,8 +143,9 @@ class App:
         self._faults_to_set = faults
         commands = Commands(self.supervisor, self.network, workshop, self.faults, self._trouble)
         self.service = Service(profile.name, self.supervisor, commands, self.bus, self.cycle, profile_file)
+        self._gathering = Gathering(self.bus)
         if runs:
-            self.service.runs = RunRecorder(runs, self.supervisor, self.bus, profile, bus, self._trouble)
+            self.service.runs = RunRecorder(runs, self.supervisor, self._gathering, profile, bus, self._trouble)
         self._localise(commands)
         self._groups = groups
         self.server = self._serve(socket) if socket else None
@@ -221,7 +223,7 @@ class App:
             await self.gateway.start()
         if self._record is not None:
             self.recorder = BusRecorder(
-                self.bus,
+                self._gathering,
                 self._record,
                 self.profile.name,
                 self.supervisor.log,

@@ -11,11 +11,11 @@ from canhelm.errors import ConfigError
 from daemon.runtime.clock import VirtualTimeLoop
 from daemon.runtime.disk import Disk
 from daemon.runtime.events import EventLog
+from daemon.runtime.gathering import Gathering
 from daemon.runtime.log_files import LogFiles
 from daemon.runtime.log_forms import CANDUMP, FORMS, LogForm
 from daemon.runtime.time_of_day import epoch_s
-from drivers.bus.candump import PACKED_BYTES, pack_frame
-from drivers.bus.contract import Bus
+from drivers.bus.candump import PACKED_BYTES
 from drivers.simulated.computer_trouble import ComputerTrouble
 
 WRITE_PERIOD_S = 0.1
@@ -35,7 +35,7 @@ class BusRecorder:
     of the wall clock.
 
     Args:
-        bus: the interface to listen to.
+        gathering: of the bus.
         path: file or folder, as :class:`daemon.runtime.log_files.LogFiles` takes it.
         robot: the robot's name.
         events: where a disk that fails is told.
@@ -49,7 +49,7 @@ class BusRecorder:
 
     def __init__(
         self,
-        bus: Bus,
+        gathering: Gathering,
         path: Path,
         robot: str,
         events: EventLog,
@@ -64,7 +64,7 @@ class BusRecorder:
         sync = not isinstance(self._loop, VirtualTimeLoop)
         self._form = next((each for each in FORMS.values() if path.suffix == each.suffix), form)
         self._files = LogFiles(path, self._form, robot, limit_bytes, sync=sync, trouble=self._trouble)
-        self._bus = bus
+        self._gathering = gathering
         self._events = events
         self._taken = self._lost = 0
         self._disk: Disk | None = None
@@ -97,13 +97,16 @@ class BusRecorder:
                 remedy="name a folder that this user may write to, or a new file",
             ) from error
         self._disk = Disk(self._on_failure, self._trouble)
-        self._bus.taps.append(self._record)
+        self._gathering.join(self._take)
+        self._timer = self._loop.call_later(WRITE_PERIOD_S, self._on_timer)
 
     def close(self) -> None:
         """Write what is left and end the log; a recorder that was never started has nothing to do."""
         if self._disk is None:
             return
-        self._bus.taps.remove(self._record)
+        if self._timer is not None:
+            self._timer.cancel()
+        self._gathering.leave(self._take)
         self._write()
         self._disk.do(self._files.close)
         self._disk.close()
@@ -119,16 +122,17 @@ class BusRecorder:
             "errors": self.errors,
         }
 
-    def _record(self, can_id: int, data: bytes, timestamp_s: float) -> None:
-        self._pending += pack_frame(timestamp_s, can_id, len(data), data)
-        if self._timer is None:
-            period_s = RETRY_PERIOD_S if self._failing else WRITE_PERIOD_S
-            self._timer = self._loop.call_later(period_s, self._write)
+    def _take(self, packed: bytearray) -> None:
+        self._pending += packed
+
+    def _on_timer(self) -> None:
+        self._gathering.hand_out()
+        if self._pending:
+            self._write()
+        period_s = RETRY_PERIOD_S if self._failing else WRITE_PERIOD_S
+        self._timer = self._loop.call_later(period_s, self._on_timer)
 
     def _write(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
         assert self._disk is not None
         packed, self._pending = self._pending, bytearray()
         self._taken += len(packed) // PACKED_BYTES
@@ -140,7 +144,7 @@ class BusRecorder:
 
     def _write_out(self, packed: bytearray, now_s: float) -> None:
         """In the disk's thread."""
-        told = self._form.make(packed, self._epoch_s, self._bus.name)
+        told = self._form.make(packed, self._epoch_s, self._gathering.bus.name)
         self._files.write(told, len(packed) // PACKED_BYTES, now_s)
 
     def _on_failure(self, error: OSError) -> None:

@@ -30,20 +30,18 @@ from daemon.runtime.cycle_rows import CycleRows
 from daemon.runtime.disk import Disk
 from daemon.runtime.fault_text import FaultText
 from daemon.runtime.flight_recorder import KEPT_S, FlightRecorder, Slice
+from daemon.runtime.gathering import Gathering
 from daemon.runtime.motions import Motion
 from daemon.runtime.recording import Pending, Recording, Step
 from daemon.runtime.supervisor import Supervisor
 from daemon.runtime.time_of_day import epoch_s
-from drivers.bus.candump import make_lines, pack_frame
-from drivers.bus.contract import Bus
+from drivers.bus.candump import make_lines
 from drivers.epos.drive import EposDrive
 from drivers.simulated.computer_trouble import ComputerTrouble
 from profiles.schema import Profile
 
 LOGGER = logging.getLogger("canhelm.runs")
 FLUSH_PERIOD_S = 1.0
-WAITING_BYTES = 10_000
-"""Frames that may wait for the end of a control cycle; where there is none, so many wait for more."""
 ROOM = "make room there, or: canhelm runs delete NUMBER"
 ELSEWHERE = "keep them in a folder that can be written: canhelm run --runs DIR"
 
@@ -57,7 +55,7 @@ class RunRecorder:
     Args:
         store: where runs are kept.
         supervisor: whose motions they are.
-        bus: whose frames are recorded while something moves.
+        gathering: of the bus' frames, which are recorded while something moves.
         profile: the robot as it is run.
         spec: of the bus.
         trouble: what faults make of a simulated robot's computer.
@@ -71,7 +69,7 @@ class RunRecorder:
         self,
         store: RunStore,
         supervisor: Supervisor,
-        bus: Bus,
+        gathering: Gathering,
         profile: Profile,
         spec: str,
         trouble: ComputerTrouble | None = None,
@@ -79,7 +77,7 @@ class RunRecorder:
         self.message = self.remedy = ""
         self._store = store
         self._supervisor = supervisor
-        self._bus = bus
+        self._gathering = gathering
         self._profile = profile
         self._spec = spec
         self._trouble = trouble or ComputerTrouble()
@@ -97,8 +95,7 @@ class RunRecorder:
         self._flight = FlightRecorder(self._supervisor, self._store.run_bytes, self._keep_fault)
         self._supervisor.on_motion.append(self._on_motion)
         self._supervisor.observers.append(self._on_cycle)
-        self._frames = bytearray()
-        self._bus.taps.append(self._on_frame)
+        self._gathering.join(self._take_frames)
 
     def close(self) -> None:
         """End the runs under way and write what is left; nothing where it was never started."""
@@ -106,8 +103,7 @@ class RunRecorder:
             return
         self._supervisor.on_motion.remove(self._on_motion)
         self._supervisor.observers.remove(self._on_cycle)
-        self._bus.taps.remove(self._on_frame)
-        self._hand_out()
+        self._gathering.leave(self._take_frames)
         for recording in list(self._recordings):
             self._end(recording)
         self._disk.close()
@@ -228,7 +224,7 @@ class RunRecorder:
                 self._begin(recording.motion, recording.part + 1)
 
     def _end_closed(self) -> None:
-        self._hand_out()
+        self._gathering.hand_out()
         for recording in list(self._recordings):
             if recording.motion.closed.is_set():
                 self._end(recording)
@@ -240,18 +236,10 @@ class RunRecorder:
             recording.flushed_s = now_s
             self._flush(recording)
 
-    def _on_frame(self, can_id: int, data: bytes, timestamp_s: float) -> None:
-        self._frames += pack_frame(timestamp_s, can_id, len(data), data)
-        if len(self._frames) > WAITING_BYTES:
-            self._hand_out()
-
-    def _hand_out(self) -> None:
-        """Give the frames since the last time to all who keep them."""
-        if self._frames:
-            for recording in self._recordings:
-                recording.frames += self._frames
-            self._flight.take_frames(self._frames, self._loop.time())
-            self._frames.clear()
+    def _take_frames(self, packed: bytearray) -> None:
+        for recording in self._recordings:
+            recording.frames += packed
+        self._flight.take_frames(packed, self._loop.time())
 
     # --- faults ------------------------------------------------------------------------------------------------
 
@@ -273,7 +261,7 @@ class RunRecorder:
         )
 
     def _make_frames(self, epoch_s: float, packed: bytearray) -> bytes:
-        return make_lines(packed, epoch_s, self._bus.name)
+        return make_lines(packed, epoch_s, self._gathering.bus.name)
 
     def _write_fault(
         self,

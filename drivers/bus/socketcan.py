@@ -182,10 +182,12 @@ class SocketCanBus(Bus):
     def _receive(self) -> OSError | None:
         """Take what has come; the error that says that the interface is gone, if it does."""
         link = self._link
+        if link is None:
+            return None
         self._now_s = self._loop.time()
         self._wall_to_loop_s = self._now_s - time.time()
         for _ in range(BATCH):
-            if link is None or link is not self._link:
+            if link is not self._link:
                 break  # a handler closed the bus
             try:
                 packet, ancillary, flags, _ = link.recvmsg(LONGEST_PACKET_BYTES, ANCILLARY_BYTES)
@@ -209,12 +211,13 @@ class SocketCanBus(Bus):
             return
         for tap in self._tapping:
             tap(can_id, data, stamp)
-        if flags & _OURS and can_id in self._heard:
-            self.counters.sent += not flags & _OWN
-            self._heard[can_id](can_id, data, stamp)
-            return
-        if flags & _OWN:
-            return
+        if flags & _OURS:
+            if can_id in self._heard:
+                self.counters.sent += not flags & _OWN
+                self._heard[can_id](can_id, data, stamp)
+                return
+            if flags & _OWN:
+                return
         if self.down is not None:
             self._recover()
         self.counters.received += 1

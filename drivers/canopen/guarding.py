@@ -52,9 +52,8 @@ class Guard:
         self._on_lost = on_lost
         self._pacing = pacing
         self._lost_s = max(LOST_AFTER * guard_time_s, patience_s)
-        self._armed = False
         self._called_s = 0.0
-        self._next_s = 0.0
+        self._next_s = math.inf
         self._asked_s: float | None = None
         self._repeated = False
         self._alive_s = 0.0
@@ -62,30 +61,27 @@ class Guard:
 
     def arm(self, now_s: float) -> None:
         """Guard from now on; the first request goes out with the next call of :meth:`due`."""
-        self._armed = True
-        self._called_s = self._next_s = self._alive_s = now_s
+        self._next_s = self._alive_s = now_s
         self._await_no_more()
         self._toggle = None
 
     @property
     def armed(self) -> bool:
         """Whether the node is guarded."""
-        return self._armed
+        return self._next_s < math.inf
 
     def disarm(self) -> None:
         """Ask no more."""
-        self._armed = False
+        self._next_s = math.inf
         self._await_no_more()
 
     def due(self, now_s: float) -> None:
         """Send what is due; called by each good control cycle."""
-        if not self._armed:
-            return
-        pause_s, self._called_s = now_s - self._called_s, now_s
         if self._asked_s is None:
-            if now_s >= self._next_s - EARLY * self.guard_time_s:
+            if now_s >= self._next_s:
                 self._ask(now_s)
             return
+        pause_s, self._called_s = now_s - self._called_s, now_s
         if pause_s > PAUSE * self.guard_time_s:  # of this program: an answer may wait unread, its time begins anew
             self._asked_s += pause_s
         if now_s >= self._asked_s + self._lost_s:
@@ -95,15 +91,15 @@ class Guard:
             self._request(RTR_FLAG | ERROR_CONTROL_COB_ID + self.node)
 
     def _ask(self, now_s: float) -> None:
-        self._asked_s = now_s
+        self._asked_s = self._called_s = now_s
         self._pacing.guard_asked(self.node)
-        self._next_s = (math.floor(now_s / self.guard_time_s + EARLY) + 1) * self.guard_time_s
+        self._next_s = (math.floor(now_s / self.guard_time_s + EARLY) + 1 - EARLY) * self.guard_time_s
         self._repeated = False
         self._request(RTR_FLAG | ERROR_CONTROL_COB_ID + self.node)
 
     def lose(self, now_s: float) -> None:
         """The node is known to be silent; its guard reports it lost."""
-        if self._armed:
+        if self.armed:
             self.disarm()
             self._on_lost(now_s - self._alive_s)
 

@@ -17,6 +17,7 @@ from canhelm.errors import ConfigError
 from daemon.runtime import log_files
 from daemon.runtime.clock import run_virtual
 from daemon.runtime.events import EventLog
+from daemon.runtime.gathering import Gathering
 from daemon.runtime.recorder import LIMIT_BYTES, WRITE_PERIOD_S, BusRecorder
 from drivers.bus.candump import parse_line
 from drivers.bus.contract import RTR_FLAG
@@ -49,7 +50,7 @@ def disk(monkeypatch: pytest.MonkeyPatch) -> Iterator[type[FragileDisk]]:
 
 def record(port: SimulatedPort, path: Path, limit_bytes: int = LIMIT_BYTES) -> BusRecorder:
     """A recorder that has begun."""
-    recorder = BusRecorder(port, path, "max2d", EventLog(), limit_bytes)
+    recorder = BusRecorder(Gathering(port), path, "max2d", EventLog(), limit_bytes)
     recorder.start()
     return recorder
 
@@ -135,7 +136,7 @@ async def test_a_full_disk_and_its_end_are_told_once_each(
     port: SimulatedPort, tmp_path: Path, disk: type[FragileDisk]
 ) -> None:
     events = EventLog()
-    recorder = BusRecorder(port, tmp_path / "run.log", "max2d", events)
+    recorder = BusRecorder(Gathering(port), tmp_path / "run.log", "max2d", events)
     recorder.start()
     await send_for_5_s(port, disk)
     recorder.close()

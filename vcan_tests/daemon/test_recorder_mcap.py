@@ -15,6 +15,7 @@ from mcap.reader import make_reader
 
 from daemon.runs.mcap_bytes import TAIL, make_messages
 from daemon.runtime.events import EventLog
+from daemon.runtime.gathering import Gathering
 from daemon.runtime.log_forms import MCAP
 from daemon.runtime.recorder import WRITE_PERIOD_S, BusRecorder
 from drivers.bus.candump import pack_frame
@@ -35,7 +36,7 @@ def messages(data: bytes) -> list[tuple[int, dict[str, Any]]]:
 
 async def test_the_file_is_whole_after_each_piece(port: SimulatedPort, tmp_path: Path) -> None:
     file = tmp_path / "bus.mcap"
-    recorder = BusRecorder(port, file, "max2d", EventLog())
+    recorder = BusRecorder(Gathering(port), file, "max2d", EventLog())
     recorder.start()
     for number in range(3):
         assert [content["data_hex"] for _, content in messages(file.read_bytes())] == ["00", "01", "02"][:number]
@@ -46,7 +47,7 @@ async def test_the_file_is_whole_after_each_piece(port: SimulatedPort, tmp_path:
 
 
 async def test_a_full_file_is_followed_by_a_whole_one(port: SimulatedPort, tmp_path: Path) -> None:
-    recorder = BusRecorder(port, tmp_path / "logs", "max2d", EventLog(), 8 * 3_000, MCAP)
+    recorder = BusRecorder(Gathering(port), tmp_path / "logs", "max2d", EventLog(), 8 * 3_000, MCAP)
     recorder.start()
     for number in range(100):
         port.send(0x181, bytes([number]))
