@@ -154,7 +154,7 @@ def _vehicle_names(data: dict[str, Any]) -> Iterator[Finding]:
         known = _wheels(data) if key == "wheels" else _defined(data, kind)
         for index, name in enumerate(names):
             path = ("vehicle", key, name if isinstance(given, dict) else index)
-            if known is not None and name not in known:
+            if known is not None and name not in list(known):  # it may have no hash
                 yield _unknown(path, kind, name, known)
             elif name in names[:index]:
                 yield Finding(path, f"{name!r} stands here twice", f"name each of {kind} once")
@@ -210,7 +210,7 @@ def _traction(data: dict[str, Any]) -> Iterator[Finding]:
     if not part(data, "traction") or part(data, "accelerometer") or drives is None:
         return
     for name in _names(part(data, "vehicle"), "wheels"):
-        if name in drives and part(drives, name).get("mode") != "velocity":
+        if name in list(drives) and part(drives, name).get("mode") != "velocity":
             remedy = f"write mode: velocity at drives.{name}, or an accelerometer:"
             yield Finding(("traction",), f"the currents of {name} tell no slip while it ramps by itself", remedy)
 
