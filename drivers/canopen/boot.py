@@ -105,6 +105,7 @@ class NodeBoot:
         else:
             self._ready()
             await self._gone.wait()
+            await asyncio.sleep(1.0 / self._master.network.cycle_hz)  # pre-operational, it would not hear its last PDOs
 
     async def _wait_for_node(self) -> None:
         pause_s = FIRST_PAUSE_S

@@ -83,6 +83,7 @@ class EposDrive(CanopenDevice):
         self._stale_s = master.network.late_after_cycles * self._period_s
         self.turns = Turns(self.who, config.node)
         self.waiters = StatuswordWaiters(self.who, config.node)
+        self._insisting = asyncio.Lock()
         master.subscribe(tpdo_cob_id(1, config.node), self._on_tpdo1)
         self._reads_analog = config.analog_inputs
         self._stop_input = EmergencyStopInput(config.emergency_stop, self.who) if config.emergency_stop else None
@@ -213,7 +214,8 @@ class EposDrive(CanopenDevice):
             DeviceFault: it did not follow its PDOs, and was switched off by other means.
         """
         self.require_ready()
-        self._interrupt(Refused(f"{self.who} was disabled in the meantime", node=self.node))
+        async with self._insisting:  # a quick stop that is not proven yet goes first: who is silent runs on meanwhile
+            self._interrupt(Refused(f"{self.who} was disabled in the meantime", node=self.node))
         self._drop_target()
         self._command(Command.DISABLE_VOLTAGE)
         if is_powered(self.statusword):
@@ -231,13 +233,17 @@ class EposDrive(CanopenDevice):
         self._drop_target()
         self._controlword = int(Command.QUICK_STOP)
         if self.node_state is NodeState.READY and self.state is not DriveState.DISABLED:
-            soon_s = asyncio.get_running_loop().time() + self._stale_s
-            self._send(self._rpdo3, make_rpdo3(Command.QUICK_STOP, self.mode), soon_s)
-            self.transmit(soon_s)
+            self._send_quick_stop()
+
+    def _send_quick_stop(self) -> None:
+        soon_s = asyncio.get_running_loop().time() + self._stale_s
+        self._send(self._rpdo3, make_rpdo3(Command.QUICK_STOP, self.mode), soon_s)
+        self._send(self._rpdo1, _pack_rpdo1(Command.QUICK_STOP, 0), soon_s)
 
     async def insist_on_stop(self) -> None:
         """See :func:`drivers.epos.device_control.insist_on_stop`."""
-        await device_control.insist_on_stop(self, INSIST_CYCLES * self._stale_s)
+        async with self._insisting:
+            await device_control.insist_on_stop(self, INSIST_CYCLES * self._stale_s)
 
     async def reset_fault(self) -> None:
         """Clear a fault by a rising edge of the fault reset bit.
@@ -346,7 +352,9 @@ class EposDrive(CanopenDevice):
             changed(True)
 
     def on_lost(self, fault: Fault) -> None:
-        """Nothing is known of it any more, and nothing is commanded."""
+        """Nothing is known of it any more, and nothing is commanded but a last quick stop, which it may still hear."""
+        if self.state not in (DriveState.DISABLED, DriveState.FAULT, DriveState.UNKNOWN):
+            self._send_quick_stop()
         self._stand_down()
         self.state = DriveState.UNKNOWN
         self.speed_m_s = self.current_a = 0.0

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from canhelm.errors import CanhelmError, DeviceFault
+from drivers.contract import DriveState
 from drivers.simulated.max2d import Max2dWorld
 from profiles.loader import load
 from vcan_tests.daemon.nxt_twin import NXT
@@ -92,6 +93,28 @@ async def test_a_motion_that_a_fault_has_ended_is_told_as_stopping_until_its_dri
 async def test_what_a_motion_ends_by_in_a_fault_names_the_reset() -> None:
     async with _struck(kind="silence", part="front_left") as (_, driving):
         assert (await driving).remedy.endswith("; then `canhelm reset`")
+
+
+async def test_a_lost_drive_that_still_hears_is_stopped_at_once_and_not_by_its_life_guarding() -> None:
+    async with _struck(kind="lose", cob_id=0x703) as (robot, driving):
+        await robot.call("simulation.fault", kind="lose", cob_id=0x583)
+        await robot.until(lambda: robot.state == "fault")
+        motion = robot.network.drives["front_left"].motion
+        speed = motion.demand_speed
+        assert await robot.until(lambda: motion.demand_speed < speed) < TOLD_S
+        await driving
+
+
+async def test_a_silent_drive_is_stopped_by_sdo_though_its_motion_is_over_before() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        steering = robot.begin("steer", pair="front", angle_deg=15.0)
+        await robot.until(lambda: robot.app.devices.drives["front_left"].state is DriveState.ENABLED)
+        await robot.call("simulation.fault", kind="pdo_short", part="front_left")
+        await robot.until(lambda: robot.state == "fault")
+        await asyncio.sleep(0.1)
+        told = [event["message"] for event in robot.app.supervisor.log.events]
+        assert "node 3 (front_left) does not follow its PDOs and was stopped by SDO" in told
+        await steering
 
 
 @pytest.mark.parametrize("command", ["stop", "estop"])
