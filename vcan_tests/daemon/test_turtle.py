@@ -390,6 +390,6 @@ async def test_a_robot_that_pushes_a_wall_holds_its_wheels_near_their_best_pull(
         await robot.call("stop")
         with pytest.raises(Refused):
             await driving
-    assert sum(pushing) > 0.8 * len(pushing)
+    assert sum(pushing) > 0.5 * len(pushing)
     assert max(slips) < 0.3
     assert motion["safety_factor"] == 1.0

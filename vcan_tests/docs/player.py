@@ -190,7 +190,8 @@ class Player:
             os.write(self._keys, f"{answered}\n".encode())
 
         code, err = 0, Screen(shown, answer)
-        with contextlib.redirect_stdout(Screen(shown, None)), contextlib.redirect_stderr(err):
+        moment = self.daemon.command() if self.daemon else contextlib.nullcontext()
+        with moment, contextlib.redirect_stdout(Screen(shown, None)), contextlib.redirect_stderr(err):
             if program == "canhelm":
                 code = main(arguments)
             else:

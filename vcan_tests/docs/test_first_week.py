@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,9 @@ from profiles.schema import Profile
 from vcan_tests.docs.player import Player, fits, told_anew
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "first-week.md"
+DURATION = re.compile(r"(?<=duration_s: )[\d.]+$", re.MULTILINE)
+DURATION_S = 0.1
+"""How alike: beside a client that listens, virtual time goes on while another one thinks."""
 pytestmark = pytest.mark.timeout(600)
 
 
@@ -53,7 +57,11 @@ def week(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Week]:
 
 def test_the_page_shows_what_its_commands_say(week: Week) -> None:
     anew = "`python -m vcan_tests.docs.player docs/first-week.md` writes down what they say now"
-    assert week.told.splitlines() == PAGE.read_text(encoding="utf-8").splitlines(), anew
+    page = PAGE.read_text(encoding="utf-8")
+    assert DURATION.sub("", week.told).splitlines() == DURATION.sub("", page).splitlines(), anew
+    assert [float(s) for s in DURATION.findall(week.told)] == pytest.approx(
+        [float(s) for s in DURATION.findall(page)], abs=DURATION_S
+    ), anew
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import contextlib
 import select
 import socket
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from canhelm import protocol
@@ -27,6 +27,8 @@ MOMENT_S = 0.5
 BOOT_S = 20.0
 """How long a robot may take to be ready; one that something is wrong with stays as it is then."""
 LOOK_S = 0.01
+PATIENCE_S = 60.0
+"""Of wall time, until a command's client has gone."""
 RENEW_S = 0.5
 RENEWAL = protocol.make_request(0, "lease.renew", {}).replace(b'"id":0,', b"")
 
@@ -89,6 +91,8 @@ class VirtualDaemon:
         self._bell, self._waiting = socket.socketpair()
         self._clients: dict[socket.socket, Connection] = {}
         self._ready = threading.Event()
+        self._counted = threading.Condition()
+        self._count = 0
         self._ended = False
         self._failure: BaseException | None = None
         self._thread = threading.Thread(target=self._live, name="daemon")
@@ -100,8 +104,18 @@ class VirtualDaemon:
         theirs, ours = socket.socketpair()
         theirs.settimeout(timeout_s)
         self._arrived.append(ours)
+        with self._counted:
+            self._count += 1
         self._bell.send(b"!")
         return theirs
+
+    @contextlib.contextmanager
+    def command(self) -> Iterator[None]:
+        """Around a command; over when its clients have gone, and the moment after it."""
+        others = self._count
+        yield
+        with self._counted:
+            assert self._counted.wait_for(lambda: self._count <= others, PATIENCE_S), "a client does not go"
 
     def end(self) -> None:
         """Ctrl-C. Raises what the daemon failed with."""
@@ -136,6 +150,9 @@ class VirtualDaemon:
         self._ready.set()
         while not self._ended:
             self.now_s = asyncio.get_running_loop().time()
+            with self._counted:
+                self._count = len(self._clients) + len(self._arrived)
+                self._counted.notify_all()
             busy = [each for each in self._clients.values() if each._pending or each.subscribed]
             for end in select.select([self._waiting, *self._clients], [], [], 0 if busy else None)[0]:
                 await self._hear(end, server)
