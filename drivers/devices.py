@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Mapping
 
@@ -22,6 +23,8 @@ from profiles.bricks import BrickConfig
 from profiles.schema import DriveConfig, Profile
 
 LOGGER = logging.getLogger("canhelm")
+END_GUARDING_S = 4.0
+"""How long the end of life guarding may take for all nodes; an absent one takes 2.5 s over a serial line."""
 Connect = Callable[[OnLost], Port]
 """Makes the connection to a brick; raises BusOff where there is none to be had."""
 
@@ -91,13 +94,23 @@ class Devices:
         for brake in self.brakes.values():
             if self.drives[brake.drive].node_state is NodeState.READY:
                 await _as_far_as_possible(brake.engage)
-        for device in self.by_node.values():
-            if device.node_state is NodeState.READY:
-                await _as_far_as_possible(device.before_close)
+        await self._end_guarding()
         for boot in self._boots:
             await boot.close()
         for motors in self._motor_cycles:
             await motors.close()
+
+    async def _end_guarding(self) -> None:
+        """Nodes that do not answer in time keep it: who ends the daemon is not to wait for each of them."""
+        ready = [device for device in self.by_node.values() if device.node_state is NodeState.READY]
+        try:
+            async with asyncio.timeout(END_GUARDING_S):
+                while ready:
+                    await _as_far_as_possible(ready[0].before_close)
+                    del ready[0]
+        except TimeoutError:
+            names = ", ".join(device.name for device in ready)
+            LOGGER.warning("on closing: %s not told within %g s that the master ends", names, END_GUARDING_S)
 
 
 def _drive(master: Master, name: str, config: DriveConfig) -> EposDrive:

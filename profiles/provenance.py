@@ -97,9 +97,13 @@ FieldPath: TypeAlias = tuple[str | int, ...]
 
 
 def dotted(path: FieldPath) -> str:
-    """``("vehicle", "wheels", 0)`` as ``vehicle.wheels[0]``."""
-    text = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
+    """``("vehicle", "wheels", 0)`` as ``vehicle.wheels[0]``; a name that would not be seen is shown with its codes."""
+    text = "".join(f"[{step}]" if isinstance(step, int) else f".{_visible(step)}" for step in path)
     return text.removeprefix(".")
+
+
+def _visible(name: str) -> str:
+    return name if name.isprintable() and name.strip() else ascii(name)
 
 
 def place_of(node: Node, path: FieldPath) -> Place:

@@ -21,6 +21,8 @@ from profiles.loader import load
 from vcan_tests.robot import Robot, running_robot
 
 MAX2D = load("max2d").profile
+STOP_TIMEOUT_S = 15.0
+"""After which systemd kills the service, see systemd/canhelm@.service."""
 ANSWER_TO_A_WRITE = 7
 """Bytes of such an answer behind its operation code."""
 
@@ -86,6 +88,15 @@ async def test_a_pulled_cable_stops_every_wheel_within_the_stated_way() -> None:
         assert robot.network.world.pose[0] - x < stopping_way_m(robot.app.profile, 0.3)
         with pytest.raises(CanhelmError):
             await driving
+
+
+async def test_with_its_cable_pulled_the_daemon_ends_before_the_service_would_be_killed() -> None:
+    async with running_robot(bus="rs232", expect_errors=True) as robot:
+        assert robot.app.wire.cable is not None
+        robot.app.wire.cable.pulled = True
+        began = asyncio.get_running_loop().time()
+        await robot.app.close()
+        assert asyncio.get_running_loop().time() - began < 0.5 * STOP_TIMEOUT_S
 
 
 async def test_a_cable_pulled_while_a_pair_turns_stops_it_in_the_stated_time() -> None:
@@ -170,7 +181,7 @@ async def test_a_node_outside_the_profile_is_not_asked_while_a_drive_has_power()
 
 
 async def test_one_lost_answer_does_not_break_a_write_off() -> None:
-    async with running_robot(bus="rs232") as robot:
+    async with running_robot(bus="rs232", expect_errors=True) as robot:
         assert robot.app.wire.cable is not None
         to_host = robot.app.wire.cable.to_host
         written = asyncio.create_task(robot.call("sdo.write", node=3, object="profile_acceleration", value=4000))

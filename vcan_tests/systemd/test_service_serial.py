@@ -53,6 +53,7 @@ def drop_in(port: Path) -> Iterator[Path]:
     told("install", "-D", "--mode=644", str(EXAMPLE), str(DROP_INS / EXAMPLE.name))
     told("systemctl", "daemon-reload")
     yield DROP_INS / EXAMPLE.name
+    tell("systemctl", "stop", SERVICE)  # first: a closed serial port of a guest that is written to goes deaf
     told("rm", "--recursive", str(DROP_INS))
     told("systemctl", "daemon-reload")
 
