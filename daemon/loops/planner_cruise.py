@@ -114,11 +114,7 @@ def half_turn(velocity: complex, contact: float) -> Change:
     if s > across:
         p, s = asin(across), across
     c = cos(p)
-    b = s * s / (1.0 + c)
-    q = (1.0 - along) / b
-    if q < 1.0:
-        q = 1.0
-    root = sqrt((q - 1.0) * (q + 1.0) + s * s)
+    b, q, root = _bend(along, c, s)
     h = log1p((q - 1.0 + root - s) / (1.0 + s))
     steepness, tilt = q / root, along - across * c / root
     bent = 1.0 + s * (h - steepness)
@@ -131,6 +127,15 @@ def half_turn(velocity: complex, contact: float) -> Change:
     if signed < 0.0:
         return -displaced, slope, p + miss / narrow, turning / narrow
     return displaced, slope, p + miss / narrow, -turning / narrow
+
+
+def _bend(along: float, c: float, s: float) -> tuple[float, float, float]:
+    """b, q and root of :func:`half_turn`, from cos p and sin p."""
+    b = s * s / (1.0 + c)
+    q = (1.0 - along) / b
+    if q < 1.0:
+        q = 1.0
+    return b, q, sqrt((q - 1.0) * (q + 1.0) + s * s)
 
 
 def ramp_arcs(travel: complex, start: complex, end: complex, found: Cruise) -> list[Arc]:
@@ -162,9 +167,7 @@ def _turn(velocity: complex, heading: complex, contact: float, toward: float) ->
         ramp = ramp_between(velocity, heading) if toward > 0 else ramp_between(heading, velocity)
         return [ramp], (1.0 - along * along) * 0.5
     c, s = cos(contact), sin(contact)
-    b = s * s / (1.0 + c)
-    q = max(1.0, (1.0 - along) / b)
-    root = sqrt((q - 1.0) * (q + 1.0) + s * s)
+    b, q, root = _bend(along, c, s)
     bending = b * (root - s)
     # From half_turn, with b c h = across - s.
     forward = bending - b * (b * (root * q - s) + c * (abs(across) - s)) * 0.5 + s
