@@ -7,11 +7,15 @@ those of a real daemon, and what they print is the same each time.
 
 from __future__ import annotations
 
+import array
 import asyncio
 import contextlib
+import fcntl
 import select
 import socket
+import termios
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -29,6 +33,9 @@ BOOT_S = 20.0
 LOOK_S = 0.01
 PATIENCE_S = 60.0
 """Of wall time, until a command's client has gone."""
+READING_S = 1.0
+"""Of wall time, until a client that listens has read what it was told."""
+GLANCE_S = 0.0002
 RENEW_S = 0.5
 RENEWAL = protocol.make_request(0, "lease.renew", {}).replace(b'"id":0,', b"")
 
@@ -40,10 +47,19 @@ class Wire(asyncio.Transport):
         super().__init__({"socket": end})
         self.end = end
         self._closing = False
+        self._told = False
 
     def write(self, data: bytes | bytearray | memoryview) -> None:
         with contextlib.suppress(OSError):
             self.end.sendall(data)
+            self._told = True
+
+    def let_read(self) -> None:
+        """Wait until the client has read what was written, and let its thread begin to think about it."""
+        deadline_s = time.monotonic() + READING_S
+        while self._told and time.monotonic() < deadline_s:
+            self._told = _unread(self.end) > 0
+            select.select([], [], [], GLANCE_S)
 
     def is_closing(self) -> bool:
         return self._closing
@@ -60,6 +76,13 @@ class Wire(asyncio.Transport):
         """Nothing is read unasked."""
 
     resume_reading = pause_reading
+
+
+def _unread(end: socket.socket) -> int:
+    """Bytes that the other end has yet to read."""
+    count = array.array("i", [0])
+    fcntl.ioctl(end, termios.TIOCOUTQ, count)
+    return count[0]
 
 
 class OpenServer(Server):
@@ -90,6 +113,7 @@ class VirtualDaemon:
         self._arrived: list[socket.socket] = []
         self._bell, self._waiting = socket.socketpair()
         self._clients: dict[socket.socket, Connection] = {}
+        self._wires: list[Wire] = []
         self._ready = threading.Event()
         self._counted = threading.Condition()
         self._count = 0
@@ -153,6 +177,8 @@ class VirtualDaemon:
             with self._counted:
                 self._count = len(self._clients) + len(self._arrived)
                 self._counted.notify_all()
+            for wire in self._wires:
+                wire.let_read()
             busy = [each for each in self._clients.values() if each._pending or each.subscribed]
             for end in select.select([self._waiting, *self._clients], [], [], 0 if busy else None)[0]:
                 await self._hear(end, server)
@@ -180,6 +206,7 @@ class VirtualDaemon:
             self._clients[end].data_received(data)
         else:
             self._clients.pop(end).connection_lost(None)
+            self._wires = [wire for wire in self._wires if wire.end is not end]
             end.close()
             await asyncio.sleep(MOMENT_S)
 
@@ -187,4 +214,5 @@ class VirtualDaemon:
         while self._arrived:
             end = self._arrived.pop()
             self._clients[end] = connection = Connection(server)
-            connection.connection_made(Wire(end))
+            self._wires.append(Wire(end))
+            connection.connection_made(self._wires[-1])
