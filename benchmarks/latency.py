@@ -12,6 +12,7 @@ from benchmarks.robots import STRAIGHT, begin, booted, robot_at
 from benchmarks.section import Options, Section, Table
 from benchmarks.spread import cell_heads, histogram, log_edges, spread
 from daemon.app import App
+from daemon.loops.measurement import Measurement
 from daemon.runtime.clock import run_precise
 
 CYCLE_HZ = 100.0
@@ -26,7 +27,7 @@ class Stopwatch:
         app: a daemon that has booted.
 
     Attributes:
-        latencies_s: from the delivery of the last TPDO to all RPDOs in the bus's transmit queue, odometry included.
+        latencies_s: from the delivery of the last TPDO to all RPDOs in the bus's transmit queue.
     """
 
     def __init__(self, app: App) -> None:
@@ -35,16 +36,19 @@ class Stopwatch:
         self._receive = app.bus.receiver
         self._delivered_s = math.nan
         app.bus.receiver = self._on_frame
-        app.supervisor.observers.insert(0, self._on_step)
+        vehicle = app.supervisor.vehicle
+        self._observe = vehicle.observe
+        vehicle.observe = self._on_sent  # type: ignore[method-assign]  # what a step does next
 
     def _on_frame(self, can_id: int, data: bytes, timestamp_s: float) -> None:
         self._delivered_s = perf_counter()
         self._receive(can_id, data, timestamp_s)
         self._delivered_s = math.nan
 
-    def _on_step(self) -> None:
+    def _on_sent(self, measurement: Measurement) -> None:
         if not math.isnan(self._delivered_s):
             self.latencies_s.append(perf_counter() - self._delivered_s)
+        self._observe(measurement)
 
 
 def run(options: Options) -> Section:
