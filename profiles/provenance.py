@@ -103,7 +103,7 @@ def dotted(path: FieldPath) -> str:
 
 
 def _visible(name: str) -> str:
-    return name if name.isprintable() and name.strip() else ascii(name)
+    return name if name and name.isprintable() and name == name.strip() else ascii(name)
 
 
 def place_of(node: Node, path: FieldPath) -> Place:

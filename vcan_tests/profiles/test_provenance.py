@@ -113,6 +113,6 @@ def test_a_path_is_written_as_in_programs() -> None:
     assert dotted(("vehicle", "wheels", 2)) == "vehicle.wheels[2]"
 
 
-@pytest.mark.parametrize("name", ["", " ", "\u00a0", "\x1b[2J"])
+@pytest.mark.parametrize("name", ["", " ", " node", "\u00a0", "\x1b[2J"])
 def test_a_name_that_would_not_be_seen_is_shown_with_its_codes(name: str) -> None:
     assert dotted(("vehicle", name)) == f"vehicle.{name!a}"
