@@ -58,7 +58,7 @@ async def recompute(profile: Profile, lines: Iterable[bytes]) -> Recomputed:
     for number, line in enumerate(lines, 1):
         try:
             again.take(msgspec.json.decode(line))
-        except (msgspec.MsgspecError, KeyError, ValueError, TypeError, AttributeError) as error:
+        except (msgspec.MsgspecError, RecursionError, KeyError, ValueError, TypeError, AttributeError) as error:
             remedy = "name the records.jsonl of a fault, and by --profile no other kind of robot"
             raise ConfigError(f"line {number} is no record of robot {profile.name}: {error}", remedy=remedy) from error
         if again.found.difference is not None:

@@ -32,5 +32,5 @@ def kept(folder: Path) -> Profile | None:
     """The profile that was kept; None where there is none that can be read."""
     try:
         return msgspec.json.decode((folder / FILE).read_bytes(), type=Profile)
-    except (OSError, msgspec.DecodeError):
+    except (OSError, msgspec.DecodeError, RecursionError):
         return None

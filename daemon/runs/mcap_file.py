@@ -159,7 +159,7 @@ def _decoded(line: str) -> dict[str, Any] | None:
     """A line of JSON with a time; None for one that was cut short."""
     try:
         content = msgspec.json.decode(line)
-    except msgspec.DecodeError:
+    except (msgspec.DecodeError, RecursionError):
         return None
     timed = isinstance(content, dict) and isinstance(content.get("time_s"), int | float)
     return content if timed else None

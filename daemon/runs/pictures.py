@@ -169,7 +169,7 @@ def _steps(run: Run) -> Iterator[_Step]:
     for line in lines:
         try:
             yield msgspec.json.decode(line, type=_Step)
-        except msgspec.DecodeError:
+        except (msgspec.DecodeError, RecursionError):
             continue  # the last line of a daemon that was killed
 
 

@@ -17,7 +17,7 @@ def test_what_is_kept_of_a_shipped_profile_is_all_of_it(tmp_path: Path, name: st
     assert kept(tmp_path) == profile
 
 
-@pytest.mark.parametrize("text", ["", "{", '{"name": "max2d"}', "\xff"])
+@pytest.mark.parametrize("text", ["[" * 10_000, "", "{", '{"name": "max2d"}', "\xff"])
 def test_what_can_not_be_read_counts_as_not_kept(tmp_path: Path, text: str) -> None:
     (tmp_path / FILE).write_text(text, encoding="latin-1")
     assert kept(tmp_path) is None

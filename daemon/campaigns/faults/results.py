@@ -78,7 +78,7 @@ class FaultResults:
                 outcome = msgspec.json.decode(line, type=Outcome)
                 self.tried[Injection(outcome.strike, outcome.index)] = outcome
                 return
-        except msgspec.MsgspecError as error:
+        except (msgspec.MsgspecError, RecursionError) as error:
             what = f"is no result: {error}"
         remedy = "give another folder with --out, or delete this file"
         raise ConfigError(f"{self._path}:{number} {what}", object=str(self._path), remedy=remedy)
