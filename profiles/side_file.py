@@ -11,6 +11,7 @@ import yaml
 
 from canhelm.errors import ConfigError
 from profiles.loader import CALIBRATION, load
+from profiles.plain_yaml import read_plain
 from profiles.sensors import AngleCalibration
 
 _HEAD = "# Written by canhelm; merged last into the profile beside it. A person's file stays as it is.\n"
@@ -49,32 +50,32 @@ def write_values(profile: Path, values: Mapping[tuple[str, ...], Any]) -> Path:
     """
     side = profile.with_name(profile.stem + CALIBRATION)
     try:
-        before = side.read_text(encoding="utf-8") if side.is_file() else None
-        merged = yaml.safe_load(before) if before is not None else {}
+        before = side.read_bytes() if side.is_file() else None
+        merged = read_plain(before.decode()) if before is not None else {}
         if not isinstance(merged, dict | None):
             raise ConfigError(f"{side} is not a mapping", remedy="mend or remove it")
         for keys, value in values.items():
             merged = _with(merged or {}, keys, value)
-        _replace(side, _HEAD + yaml.safe_dump(merged, sort_keys=False))
+        _replace(side, (_HEAD + yaml.safe_dump(merged, sort_keys=False)).encode())
         _require_sound(profile, side, before)
     except OSError as error:
         remedy = "use a profile of your own: `canhelm profile new` makes one"
         raise ConfigError(f"cannot write {side}: {error.strerror}", value=str(side), remedy=remedy) from None
     except RecursionError:
         raise ConfigError(f"{side} is nested too deeply", value=str(side), remedy="mend or remove it") from None
-    except (yaml.YAMLError, ValueError) as error:
+    except ValueError as error:
         raise ConfigError(f"cannot read {side}: {error}", value=str(side), remedy="mend or remove it") from None
     return side
 
 
-def _replace(side: Path, text: str) -> None:
+def _replace(side: Path, content: bytes) -> None:
     """All of it or nothing. Raises OSError."""
     new = side.with_name(f"{side.name}.new")
-    new.write_text(text, encoding="utf-8")
+    new.write_bytes(content)
     new.replace(side)
 
 
-def _require_sound(profile: Path, side: Path, before: str | None) -> None:
+def _require_sound(profile: Path, side: Path, before: bytes | None) -> None:
     """Raise ConfigError where the profile has mistakes now, and put the side file back as it was."""
     try:
         load(profile)

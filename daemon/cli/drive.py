@@ -120,7 +120,7 @@ def to(
     heading_deg: float | None = None,
     /,
     *,
-    end_velocity: tuple[float, float] = (0.0, 0.0),
+    end_velocity: Annotated[tuple[float, float], Parameter(negative=())] = (0.0, 0.0),
     speed: float | None = None,
     published: Annotated[bool, Parameter(negative=())] = False,
     no_wait: NoWait = False,

@@ -15,6 +15,7 @@ import msgspec
 import yaml
 
 from canhelm.errors import CanhelmError, ConfigError, UsageError
+from profiles.plain_yaml import read_plain
 
 SYSTEM_FOLDER = Path("/var/lib/canhelm")
 """Where the service manager keeps the state of robots' services (StateDirectory= of canhelm@.service)."""
@@ -268,7 +269,7 @@ def make_yaml(value: Any) -> bytes:
 def read_yaml(path: Path) -> dict[str, Any]:
     """The mapping in a file; empty where the file is missing or damaged."""
     try:
-        found = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, yaml.YAMLError, RecursionError):
+        found = read_plain(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
         return {}
     return found if isinstance(found, dict) else {}

@@ -8,6 +8,7 @@ import pytest
 
 from canhelm.errors import ConfigError
 from profiles.loader import load
+from profiles.plain_yaml import read_plain
 from profiles.side_file import write_values
 
 FORWARD: dict[tuple[str, ...], int] = {("drives", "rear_left", "direction"): -1}
@@ -32,3 +33,9 @@ def test_one_that_is_damaged_is_told_and_left_alone(robot: Path, content: bytes)
     with pytest.raises(ConfigError, match="lab\\.calibration\\.yaml"):
         write_values(robot, FORWARD)
     assert side.read_bytes() == content
+
+
+@pytest.mark.parametrize("text", ["a: !!int", "a: !!float ' '", "a: !!bool perhaps", "a: !!timestamp soon", "[" * 5000])
+def test_what_is_no_yaml_is_refused_as_that(text: str) -> None:
+    with pytest.raises(ValueError, match=r"."):
+        read_plain(text)

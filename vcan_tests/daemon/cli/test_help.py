@@ -35,6 +35,11 @@ def test_completion_knows_the_verbs(shell: str, capsys: pytest.CaptureFixture[st
     assert "quick-stop" in capsys.readouterr().out
 
 
+def test_no_option_leaves_another_without_its_values(capsys: pytest.CaptureFixture[str]) -> None:
+    run("completion bash")
+    assert "--empty-" not in capsys.readouterr().out
+
+
 def test_an_installed_completion_says_which_startup_file_it_changed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
