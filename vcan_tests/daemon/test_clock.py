@@ -33,7 +33,7 @@ async def test_time_jumps_exactly_to_the_next_timer() -> None:
 def test_an_hour_takes_no_time() -> None:
     began = time.monotonic()
     run_virtual(asyncio.sleep(3600.0))
-    assert time.monotonic() - began < 1.0
+    assert time.monotonic() - began < 60.0
 
 
 async def test_timers_of_one_time_run_in_the_order_they_were_set() -> None:
@@ -176,6 +176,7 @@ async def test_a_callback_may_stop_its_own_ticker() -> None:
     assert ticker.ticks == 1
 
 
+@pytest.mark.real_time
 def test_precise_timers_are_finer_than_a_millisecond() -> None:
     async def shortest() -> float:
         loop, waits = asyncio.get_running_loop(), []
@@ -238,6 +239,7 @@ def compute(seconds: float) -> None:
         pass
 
 
+@pytest.mark.real_time
 def test_a_patient_clock_stands_still_while_the_process_is_kept_waiting() -> None:
     async def wait() -> tuple[float, float]:
         loop = asyncio.get_running_loop()
@@ -250,6 +252,7 @@ def test_a_patient_clock_stands_still_while_the_process_is_kept_waiting() -> Non
     assert left_out_s >= 0.199
 
 
+@pytest.mark.real_time
 def test_a_patient_clock_counts_what_the_process_computes() -> None:
     async def work() -> float:
         loop = asyncio.get_running_loop()
@@ -260,6 +263,7 @@ def test_a_patient_clock_counts_what_the_process_computes() -> None:
     assert run_patient(work()) >= 0.05
 
 
+@pytest.mark.real_time
 def test_a_sleep_that_the_machine_prolongs_ends_on_time_by_a_patient_clock(monkeypatch: pytest.MonkeyPatch) -> None:
     select = SelectSelector.select
 
@@ -278,6 +282,7 @@ def test_a_sleep_that_the_machine_prolongs_ends_on_time_by_a_patient_clock(monke
     assert 0.02 <= run_patient(sleep()) < 0.06
 
 
+@pytest.mark.real_time
 def test_a_patient_clock_never_goes_back() -> None:
     async def watch() -> list[float]:
         loop, times = asyncio.get_running_loop(), []
@@ -305,17 +310,20 @@ def patient_ticks(each: Callable[[float], None], for_s: float) -> Ticker:
     return run_patient(tick())
 
 
+@pytest.mark.real_time
 def test_no_tick_of_a_patient_clock_is_missed_where_the_machine_stood_still() -> None:
     ticker = patient_ticks(block, 0.13)
     assert (ticker.ticks, ticker.missed) == (6, 0)
 
 
+@pytest.mark.real_time
 def test_ticks_of_a_patient_clock_are_missed_where_the_process_computes_too_long() -> None:
     ticker = patient_ticks(compute, 0.3)
     assert ticker.missed >= ticker.ticks
     assert ticker.late >= 1
 
 
+@pytest.mark.real_time
 def test_other_clocks_leave_nothing_out() -> None:
     async def left_out() -> float:
         block(0.01)
