@@ -1,0 +1,100 @@
+/** Who the page's person is, and which robots there are: asked again and again over HTTP. */
+
+import { h } from "./dom.js";
+
+const PERIOD_MS = 2000;
+
+/**
+ * Ask for the login where one is needed, then keep the choice of robots up to date.
+ *
+ * @param {object} station see station.js
+ */
+export function watchLogin(station) {
+  const look = async () => {
+    await lookForRobots(station);
+    setTimeout(look, PERIOD_MS);
+  };
+  look();
+}
+
+async function lookForRobots(station) {
+  try {
+    const session = await fetched("session");
+    showLogin(session.login_needed && !session.role);
+    if (session.login_needed && !session.role) return;
+    offer(station, (await fetched("robots")).robots);
+  } catch {
+    // the station does not answer: the connection tells so
+  }
+}
+
+async function fetched(path) {
+  const answer = await fetch(path, { cache: "no-store", signal: AbortSignal.timeout(2 * PERIOD_MS) });
+  if (!answer.ok) throw new Error(answer.statusText);
+  return answer.json();
+}
+
+/** The choice of robots; a robot that is chosen stays chosen while its daemon is away. */
+function offer(station, robots) {
+  const select = document.getElementById("robot");
+  const names = robots.map((robot) => robot.name);
+  const chosen = station.robot ?? asked() ?? (robots.find((robot) => robot.alive) ?? robots[0])?.name ?? null;
+  if (chosen && !names.includes(chosen)) robots = [...robots, { name: chosen, alive: false }];
+  const told = robots.map((robot) => `${robot.name}${robot.alive ? "" : " (not running)"}`);
+  if (select.dataset.told !== told.join()) {
+    select.dataset.told = told.join();
+    select.replaceChildren(...robots.map((robot, i) => h("option", { value: robot.name }, told[i])));
+  }
+  if (chosen) select.value = chosen;
+  choose(station, chosen);
+}
+
+function asked() {
+  return new URLSearchParams(location.search).get("robot");
+}
+
+/** Choose a robot, and keep it in the address. */
+export function choose(station, robot) {
+  if (robot && asked() !== robot) {
+    history.replaceState(null, "", `?robot=${encodeURIComponent(robot)}${location.hash}`);
+  }
+  station.choose(robot);
+}
+
+function showLogin(needed) {
+  const section = document.getElementById("login");
+  if (needed && section.hidden) section.replaceChildren(...form(section));
+  section.hidden = !needed;
+}
+
+function form(section) {
+  const token = h("input", { id: "token", type: "password", autocomplete: "current-password", required: true });
+  const trouble = h("p", { class: "bad", role: "alert" });
+  const send = h("button", { type: "submit", class: "main" }, "Log in");
+  const asking = h("form", {}, h("label", { for: "token" }, "Token"), token, send, trouble);
+  asking.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    send.disabled = true;
+    trouble.textContent = await logIn(token.value);
+    send.disabled = false;
+    section.hidden = !trouble.textContent;
+  });
+  return [
+    h("h2", { id: "login-title" }, "Log in"),
+    h("p", {}, "This control station asks for a token. Whoever has set it up gives you one."),
+    asking,
+  ];
+}
+
+/** What went wrong, for people; empty where the login is done. */
+async function logIn(token) {
+  const headers = { "Content-Type": "application/json" };
+  try {
+    const answer = await fetch("login", { method: "POST", headers, body: JSON.stringify({ token }) });
+    if (answer.ok) return "";
+    const { message, remedy } = await answer.json();
+    return `${message}: ${remedy}`;
+  } catch {
+    return "The control station does not answer: is it still running?";
+  }
+}
