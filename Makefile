@@ -13,7 +13,8 @@ PACKAGED = $(shell find canhelm daemon drivers profiles packaging systemd -type 
 PACKAGING = DESTDIR='$(DESTDIR)' PREFIX='$(PREFIX)' PYTHON='$(SERVICE_PYTHON)' PIP_PYTHON='$(VENV)/bin/python'
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo docs test lint bench fuzz long-life vcan-test vcan-figures install uninstall deb client-wheel
+.PHONY: help venv demo docs test lint bench fuzz long-life vcan-test vcan-figures station-test station-pictures \
+	station-figures install uninstall deb client-wheel
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST)
@@ -29,8 +30,8 @@ docs: $(VENV)/.stamp-docs ## the documentation as a site of files, into site/; a
 	@echo "open site/index.html"
 
 test: lint ## style, types, import rules, then all tests
-	$(VENV)/bin/pytest -n auto --dist loadfile -m 'not real_time and not vcan and not systemd'
-	$(VENV)/bin/pytest -m 'real_time and not vcan and not systemd'
+	$(VENV)/bin/pytest -n auto --dist loadfile -m 'not real_time and not vcan and not systemd and not station'
+	$(VENV)/bin/pytest -m 'real_time and not vcan and not systemd and not station'
 
 fuzz: $(VENV)/.stamp-test ## any input to every reader and every wire: MINUTES=10 for each target, or TARGET=NAME alone
 	$(VENV)/bin/python -m vcan_tests.fuzz --minutes $(MINUTES) $(TARGET)
@@ -47,6 +48,15 @@ vcan-test: $(VENV)/.stamp-test ## the tests on a kernel's CAN bus and under a re
 vcan-figures: $(VENV)/.stamp-test ## measure there: stops without a daemon, period of SYNC, what tshark says, a life of the service
 	$(VENV)/bin/python -m vcan_tests.vcan.figures
 	$(VENV)/bin/python -m vcan_tests.systemd.figures
+
+station-test: $(VENV)/.stamp-station ## the control station in a headless Chromium, before simulated robots
+	$(VENV)/bin/python -m vcan_tests.station.suite $(ARGS)
+
+station-pictures: $(VENV)/.stamp-station ## its panels at a desktop and on a phone, into docs/images/station
+	$(VENV)/bin/python -m vcan_tests.station.suite --pictures docs/images/station $(ARGS)
+
+station-figures: $(VENV)/.stamp-station ## what it costs, and how soon a stop is on the bus; MINUTES=30 of an open page
+	$(VENV)/bin/python -m vcan_tests.station.figures --minutes $(MINUTES) $(ARGS)
 
 install: | $(VENV)/bin/pip ## the service on this machine (as root): /opt/canhelm, units, users; see docs/service.md
 	$(PACKAGING) packaging/install.sh
@@ -85,6 +95,11 @@ $(VENV)/.stamp-demo: pyproject.toml | $(VENV)/bin/pip
 $(VENV)/.stamp-test: pyproject.toml | $(VENV)/bin/pip
 	@echo "installing canhelm and what its tests need into $(VENV)"
 	@$(PIP) --editable '.[plot,test]'
+	@touch $@
+
+$(VENV)/.stamp-station: pyproject.toml | $(VENV)/bin/pip
+	@echo "installing canhelm, its station and what the station's tests need into $(VENV)"
+	@$(PIP) --editable '.[station]'
 	@touch $@
 
 $(VENV)/.stamp-bench: pyproject.toml | $(VENV)/bin/pip

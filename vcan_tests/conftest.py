@@ -1,4 +1,4 @@
-"""What a test needs, told by its marks: virtual time unless ``real_time``, ``vcan`` or ``systemd`` says otherwise."""
+"""What a test needs, told by its marks: virtual time unless one of the others says otherwise."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ import pytest
 from daemon.runtime.clock import VirtualTimeLoop
 from vcan_tests.awake import awake_processors
 from vcan_tests.kernel.guest import COMMAND_IN_GUEST, RUNNING_SYSTEMD
+from vcan_tests.station.browser import CHROMIUM
 
 hypothesis.settings.register_profile("canhelm", deadline=None)
 hypothesis.settings.load_profile("canhelm")
@@ -30,7 +31,9 @@ os.environ["CANHELM_RUNS"] = "off"  # nor do tests leave runs with them
 NEEDS = {
     "vcan": [Path("/sys/class/net/vcan0"), Path("/sys/class/net/vcan1")],
     "systemd": [RUNNING_SYSTEMD, COMMAND_IN_GUEST],
+    "station": [CHROMIUM],
 }
+MADE_BY = {"vcan": "make vcan-test", "systemd": "make vcan-test", "station": "make station-test"}
 
 
 def pytest_asyncio_loop_factories(item: pytest.Item) -> Mapping[str, Callable[[], asyncio.AbstractEventLoop]]:
@@ -63,8 +66,8 @@ def _awake(request: pytest.FixtureRequest) -> Iterator[None]:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """A test of the kernel's bus or of the service fails where there is none: a skipped test proves nothing."""
+    """A test of the kernel's bus, of the service or of the page fails where it can't run: a skipped one proves nothing."""
     for mark, paths in NEEDS.items():
         missing = [str(path) for path in paths if item.get_closest_marker(mark) and not path.exists()]
         if missing:
-            pytest.fail(f"marked {mark}, but here is no {' and no '.join(missing)}: run make vcan-test", pytrace=False)
+            pytest.fail(f"marked {mark}, but here is no {' and no '.join(missing)}: run {MADE_BY[mark]}", pytrace=False)

@@ -20,12 +20,16 @@ PACKAGE_OF = {
 
 
 def require_tools() -> None:
-    """Installs what is missing, where this process is root and has apt.
+    """Installs what is missing of them. Raises MissingTool where it can't be installed from here."""
+    require_packages(missing_packages())
+
+
+def require_packages(packages: list[str]) -> None:
+    """Installs Debian packages that are missing, where this process is root and has apt.
 
     Raises:
-        MissingTool: a tool is missing and can't be installed from here.
+        MissingTool: they can't be installed from here.
     """
-    packages = missing_packages()
     if not packages:
         return
     if os.geteuid() != 0 or shutil.which("apt-get") is None:
