@@ -9,8 +9,10 @@ from daemon.api.encoder_methods import ENCODER_METHODS
 from daemon.api.gamepad_methods import GAMEPAD_METHODS
 from daemon.api.lease_methods import LEASE_METHODS
 from daemon.api.localisation_methods import LOCALISATION_METHODS
+from daemon.api.look_methods import LOOK_METHODS
 from daemon.api.nxt_methods import NXT_METHODS
 from daemon.api.parameters import REQUIRED, Method, Param, Role
+from daemon.api.path_methods import PATH_METHODS
 from daemon.api.setup_methods import SETUP_METHODS
 from daemon.api.simulation_methods import SIMULATION_METHODS
 
@@ -21,7 +23,6 @@ _TIME = Param("duration_s", "number", "until stopped where left out", "s", defau
 _SPEED = Param("speed_m_s", "number", "speed of the robot's centre; negative drives backward", "m/s")
 _BRAKES = Param("pair", "string", "front, rear or all", default="all")
 _OBJECT = Param("object", "string", "name, 0x6041, or 0x2078/1")
-_KEPT = Param("kept", "string", "where path.add keeps the first pieces", default=None)
 _MOTION = Param("motion", "string", "id of the motion")
 
 
@@ -220,33 +221,6 @@ _VEHICLE = (
         needs_lease=True,
     ),
     Method(
-        "drive.path",
-        "Follow a path of lines and arcs.",
-        (
-            Param("path", "object", "start and pieces, as in a path file"),
-            _KEPT,
-            Param("backward", "boolean", "exchange forward and backward", default=False),
-            Param("speed_m_s", "number", "no faster than; as fast as it may where left out", "m/s", None, 0.001),
-            Param(
-                "law",
-                "string",
-                "the better one, or that of the semi-trailer thesis, for vehicles that have both",
-                default="cascade",
-                choices=("cascade", "published"),
-            ),
-            Param("dry_run", "boolean", "only check the path, and tell how it would be driven", default=False),
-            _WAIT,
-        ),
-        "motion, length_m, sections, duration_s, end, largest_error_m",
-        needs_lease=True,
-    ),
-    Method(
-        "path.add",
-        "Keep pieces of a path that is too long for one request, for a drive.path to come.",
-        (Param("pieces", "list", "as in a path file"), _KEPT),
-        "kept, pieces",
-    ),
-    Method(
         "drive.set",
         "Drive by direction and speed; the vehicle stops when the last value is too old. Answers at once.",
         (
@@ -381,10 +355,12 @@ METHODS: dict[str, Method] = {
         *_WHOLE,
         *_MOTOR,
         *_VEHICLE,
+        *PATH_METHODS,
         *_NETWORK,
         *_NODES,
         *_CONFIG,
         *NXT_METHODS,
+        *LOOK_METHODS,
         *LOCALISATION_METHODS,
         *ENCODER_METHODS,
         *SETUP_METHODS,

@@ -29,8 +29,8 @@ COLUMNS = {
 """Fields of a node that are shown, and the heads of their columns."""
 NARROW = 80
 """A terminal with fewer columns than this does without the devices' types."""
-HIDDEN = ("type", "methods", "name", "bit_rate")
-"""Fields of a section that do not change and are left to JSON."""
+HIDDEN = ("type", "methods", "name", "bit_rate", "pose", "wheels_deg", "icr", "following")
+"""Fields of a section that do not change, or are told elsewhere in it, and are left to JSON."""
 TOLD_AT_ZERO = ("section", "piece")
 """Fields that are numbers of something, not counters."""
 BUS_GROUPS = {

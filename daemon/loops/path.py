@@ -195,6 +195,10 @@ class Path:
         """Number by which people know a piece."""
         return self._numbers[piece]
 
+    def way_to(self, piece: int, along_m: float) -> float:
+        """Way from the path's beginning to a point of a piece [m]."""
+        return self._begin_m[piece] + along_m
+
     def section_length(self, section: int) -> float:
         """Length of a section [m]."""
         first, last = self.sections[section]

@@ -10,14 +10,20 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Final
+from typing import Final, NamedTuple
 
 from daemon.loops.articulated import ArticulatedVehicle
 from daemon.loops.cascade_following import CascadeFollower, CascadeTuning
 from daemon.loops.motion_profile import ramp
 from daemon.loops.odometry import Pose
 from daemon.loops.path import Path, wrap
-from daemon.loops.path_following import FollowingStep, FollowingTuning, PathFollower, SectionFollower
+from daemon.loops.path_following import (
+    FollowingErrors,
+    FollowingStep,
+    FollowingTuning,
+    PathFollower,
+    SectionFollower,
+)
 from daemon.loops.path_speed import PathSpeed, SpeedLimit, SpeedTuning
 
 STEERED_RAD: Final = math.radians(1.0)
@@ -60,6 +66,14 @@ class VehicleReading:
     bending_rad: tuple[float, ...]
     steering_rad: float
     speed_m_s: float
+
+
+class ErrorLimits(NamedTuple):
+    """Errors beside a path at which the drive ends; ``bending_rad`` is None without a trailer."""
+
+    position_m: float
+    heading_rad: float
+    bending_rad: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,6 +219,21 @@ class PathDriver:
         rate = self._vehicle.hitches[0].bending_rate(self._vehicle.curvature(reading.steering_rad), bending)
         growth = math.copysign(1.0, bending) * rate * (-way if backward else way)
         return self._vehicle.jackknife_margin(reading.bending_rad) - max(0.0, growth)
+
+
+def error_limits(vehicle: ArticulatedVehicle, errors: FollowingErrors, reading: VehicleReading) -> ErrorLimits:
+    """Errors at which a drive ends that is slow; that of the bending angle is the jackknife guard's, nearer side.
+
+    Args:
+        vehicle: that drives.
+        errors: of it now.
+        reading: of it now.
+    """
+    bending = None
+    if vehicle.hitches and errors.bending_rad is not None:
+        wanted_rad = reading.bending_rad[0] - errors.bending_rad
+        bending = max(0.0, vehicle.bending_limits_rad[0] - JACKKNIFE_RESERVE_RAD - abs(wanted_rad))
+    return ErrorLimits(STRAYED_M, STRAYED_RAD, bending)
 
 
 Law = Callable[[Pose, VehicleReading], FollowingStep]

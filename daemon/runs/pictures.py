@@ -25,6 +25,14 @@ COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
 STYLES = ("-", "--")
 COLUMNS = 2
 SLIP = "slip along {}"
+ERRORS = {
+    "distance [m]": (("path.error_m", "path.error_limit_m"),),
+    "angle [°]": (
+        ("path.heading_error_deg", "path.heading_error_limit_deg"),
+        ("path.bending_error_deg", "path.bending_error_limit_deg"),
+    ),
+}
+"""Errors and their limits, by what they are drawn in."""
 
 
 class _Terms(msgspec.Struct):
@@ -84,10 +92,28 @@ def panels(run: Run, table: Table, profile: Mapping[str, Any]) -> Iterator[parti
         yield partial(_speeds, table=table)
         deviations, title = _deviations(table), "measured minus commanded speed"
         yield partial(_lines, table=table, columns=deviations, title=title, label="rim speed [m/s]")
+    yield from _errors(table)
     if measured:
         title = "motor currents (positive: pushes forward)"
         yield partial(_lines, table=table, columns=currents, title=title, label="current [A]")
     yield partial(_active, table=table, times={**table.limits(), **currents_at_limit(table, profile), **_slips(run)})
+
+
+def _errors(table: Table) -> Iterator[partial[None]]:
+    """Of a motion along a path: distance from it, and angles; each line says at which value the motion ends."""
+    for label, pairs in ERRORS.items():
+        columns = {
+            _limited(error.removeprefix("path."), table.numbers.get(limit, [])): table.numbers[error]
+            for error, limit in pairs
+            if error in table.numbers
+        }
+        if told := _told(columns):
+            yield partial(_lines, table=table, columns=told, title="errors beside the path", label=label)
+
+
+def _limited(name: str, limits: list[float]) -> str:
+    known = [limit for limit in limits if not math.isnan(limit)]
+    return f"{name} (the motion ends at {min(known):.3g})" if known else name
 
 
 def _told(columns: Mapping[str, list[float]]) -> dict[str, list[float]]:

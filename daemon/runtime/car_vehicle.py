@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any, Final
 
 from canhelm.errors import Refused, UsageError
-from daemon.loops.ackermann import wheel_speeds
+from daemon.loops.ackermann import wheel_angles, wheel_speeds
 from daemon.loops.ackermann_drive import CarLaw, CarTarget, car_kinematics
 from daemon.loops.articulated import ArticulatedVehicle
 from daemon.loops.measurement import Measurement
@@ -16,12 +16,14 @@ from daemon.loops.path_driving import VehicleReading
 from daemon.loops.path_following import FollowingTuning
 from daemon.loops.path_speed import SpeedTuning
 from daemon.loops.truck_odometry import TruckOdometry
+from daemon.loops.turning_centre import Point, centre_of_curvature
 from daemon.runtime.car_motions import CarMotion
 from daemon.runtime.motions import Motion
 from daemon.runtime.path_building import build_path
 from daemon.runtime.path_commands import PathRequest
 from daemon.runtime.path_motions import FollowedPath, PathMotion
 from daemon.runtime.poses import place_and_yaw
+from daemon.runtime.shapes import FRONT, both_sides
 from daemon.runtime.steered_vehicle import SteeredVehicle
 from daemon.runtime.streams import streamed
 from daemon.runtime.vehicle import Stick, both_ways, require_at_most
@@ -175,6 +177,20 @@ class CarVehicle(SteeredVehicle):
     def place(self) -> Pose:
         """Where it is by its odometry."""
         return self.odometry.pose
+
+    def wheel_headings(self) -> dict[str, float]:
+        """The front wheels' by the steering angle, each about the centre of the turn (report, eq. 4.2, 4.3)."""
+        steering = wheel_angles(self._car, self.encoders[0].heading_rad)
+        return dict(zip((*self.names[:2], *both_sides(FRONT)), (0.0, 0.0, *steering), strict=True))
+
+    @property
+    def turning_centre(self) -> Point | None:
+        """Beside the rear axle, by the steering angle, also at rest."""
+        return centre_of_curvature(self.kinematics.curvature(self.encoders[0].heading_rad))
+
+    def smallest_radius_m(self, *, backward: bool) -> float | None:
+        """That of the steering angle that a path may need; None backward."""
+        return None if backward else 1.0 / self._planned.stable_curvature
 
     def status(self) -> dict[str, Any]:
         """Steering angle and odometry of the rear axle's middle."""

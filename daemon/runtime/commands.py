@@ -13,6 +13,7 @@ from daemon.runtime.fault_commands import FaultCommands
 from daemon.runtime.frame_commands import FrameCommands
 from daemon.runtime.gamepad_commands import GamepadCommands
 from daemon.runtime.handlers import Handler, Params, holder, run_motion
+from daemon.runtime.look_commands import LookCommands
 from daemon.runtime.motions import Motion
 from daemon.runtime.motor_commands import MotorCommands
 from daemon.runtime.network_commands import NetworkCommands
@@ -73,6 +74,7 @@ class Commands:
             **WorkshopCommands(workshop).handlers,
             **FaultCommands(supervisor, faults).handlers,
             **GamepadCommands(supervisor.vehicle).handlers,
+            **LookCommands(supervisor, simulated=network is not None).handlers,
         }
         self.paths: PathCommands | None = None
         driving: dict[str, Handler] = {method: self._vehicle_handler(method) for method in supervisor.vehicle.methods}

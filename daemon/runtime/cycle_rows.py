@@ -1,4 +1,4 @@
-"""One row a control cycle: what the wheels were told and did, where the robot was, and which limits were active."""
+"""One row a control cycle: what the wheels were told and did, where the robot was, errors beside a path, limits."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from daemon.runtime.following import COLUMNS
 from daemon.runtime.supervisor import Supervisor
+from daemon.runtime.vehicle_view import followed
 
+_NO_ERRORS = ("",) * len(COLUMNS)
 WHEEL_COLUMNS = ("commanded_m_s", "speed_m_s", "travel_m", "current_a")
 
 
@@ -34,10 +37,13 @@ class CycleRows:
         names += [f"{drive.name}.{column}" for drive in self._drives for column in WHEEL_COLUMNS]
         names += [f"{encoder.name}.heading_deg" for encoder in vehicle.encoders]
         names += [f"{brake.name}.brake" for brake in vehicle.brakes]
+        self._follows = "drive.path" in vehicle.methods
+        names += [f"path.{column}" for column in COLUMNS] if self._follows else []
         self.head = (",".join([*names, "limits"]) + "\n").encode()
         wheels = ["%.4f,%.4f,%.4f,%.3f"] * len(self._drives)
         headings, brakes = ["%.3f"] * len(vehicle.encoders), ["%s"] * len(vehicle.brakes)
-        self._format = ",".join(["%.4f", "%s", "%s", "%s", *wheels, *headings, *brakes, "%s\n"])
+        errors = ["%s"] * len(COLUMNS) if self._follows else []
+        self._format = ",".join(["%.4f", "%s", "%s", "%s", *wheels, *headings, *brakes, *errors, "%s\n"])
 
     def values(self) -> list[Any]:
         """This cycle's row, without its time."""
@@ -47,8 +53,18 @@ class CycleRows:
             values += (drive.target_speed_m_s, drive.speed_m_s, drive.position_m, sign * drive.current_a)
         values += [math.degrees(encoder.heading_rad) for encoder in self._vehicle.encoders]
         values += [brake.state for brake in self._vehicle.brakes]
+        if self._follows:
+            values += self._errors()
         values.append(" ".join(self._supervisor.active_limits))
         return values
+
+    def _errors(self) -> Sequence[float | str]:
+        """Those beside a path, and their limits; empty where there are none."""
+        motion = followed(self._supervisor.motions.values())
+        following = motion.following() if motion else None
+        if following is None:
+            return _NO_ERRORS
+        return ["" if value is None else value for value in (*following.errors(), *following.error_limits())]
 
     def text(self, time_s: float, values: Sequence[Any]) -> bytes:
         """The line of the CSV file for a row's values."""

@@ -14,6 +14,7 @@ from daemon.loops.differential_twist import DifferentialTwistLaw
 from daemon.loops.measurement import Measurement
 from daemon.loops.odometry import Pose
 from daemon.loops.pose_feedback import REPORT_GAINS, SLOW_CYCLE_GAINS, SeekSettings, Tolerance
+from daemon.loops.turning_centre import Point, centre_of_twist
 from daemon.runtime.differential_motions import BrickMoves, BrickWheels, PoseMotion
 from daemon.runtime.differential_stream import DifferentialStream, SetPoint
 from daemon.runtime.motions import Motion
@@ -184,17 +185,33 @@ class DifferentialVehicle(Vehicle):
         """Where it is by its odometry."""
         return self.odometry.pose
 
+    def wheel_headings(self) -> dict[str, float]:
+        """Both wheels roll straight ahead."""
+        return dict.fromkeys(self._names, 0.0)
+
+    @property
+    def turning_centre(self) -> Point | None:
+        """On the wheels' axis, by their speeds."""
+        forward_m_s, yaw_rate_rad_s = self._motion
+        return centre_of_twist(forward_m_s, 0.0, yaw_rate_rad_s)
+
+    @property
+    def _motion(self) -> tuple[float, float]:
+        """Speed forward [m/s] and yaw rate [rad/s]."""
+        right, left = (drive.speed_m_s for drive in self.drives)
+        return (right + left) / 2, (right - left) / 2 / self._drive.half_track_m
+
     def status(self) -> dict[str, Any]:
         """Odometry and motion."""
         pose = self.odometry.pose
-        right, left = (drive.speed_m_s for drive in self.drives)
+        forward_m_s, yaw_rate_rad_s = self._motion
         return {
             "type": DifferentialGeometry.type,
             "methods": list(self.methods),
             "odometry": place_and_yaw(pose),
             "velocity": {
-                "forward_m_s": round((right + left) / 2, 4) + 0.0,
-                "yaw_rate_deg_s": round(math.degrees((right - left) / 2 / self._drive.half_track_m), 2) + 0.0,
+                "forward_m_s": round(forward_m_s, 4) + 0.0,
+                "yaw_rate_deg_s": round(math.degrees(yaw_rate_rad_s), 2) + 0.0,
             },
         }
 

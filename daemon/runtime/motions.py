@@ -10,6 +10,8 @@ from typing import Any, TypeVar
 
 from canhelm.errors import CanhelmError, DeviceFault, Refused
 from daemon.loops.measurement import Command, Measurement
+from daemon.loops.path import Path
+from daemon.runtime.following import Following
 from daemon.runtime.streams import Streamed
 from drivers.contract import Drive, DriveState
 
@@ -36,9 +38,11 @@ class Motion(ABC):
         closed: set when its drives are at rest and as it found them.
         asked: parameters that it was asked for with.
         record: terms of its law's last step; None before the first, and where it has no law.
+        path: that is followed; None where none is.
     """
 
     record: object | None = None
+    path: Path | None = None
 
     def __init__(
         self, kind: str, drives: tuple[str, ...], lease: str | None, stream: Streamed[Any] | None = None
@@ -92,6 +96,10 @@ class Motion(ABC):
     def progress(self) -> dict[str, Any]:
         """How far it is, for ``status``."""
         return {}
+
+    def following(self) -> Following | None:
+        """How the vehicle stands to the path; None before the first step, and where no path is followed."""
+        return None
 
     def summary(self) -> dict[str, Any]:
         """The motion for ``status``; of one that is over only that its drives are being stopped."""

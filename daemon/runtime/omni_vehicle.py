@@ -17,6 +17,7 @@ from daemon.loops.omni_senses import OmniSenses, omni_kinematics, omni_observer
 from daemon.loops.planner import FARTHEST, PlanarLimits, PlanarState
 from daemon.loops.slip import THRESHOLD_M_S2
 from daemon.loops.traction import Traction, TractionTuning
+from daemon.loops.turning_centre import Point, centre_of_twist
 from daemon.runtime.motions import Motion
 from daemon.runtime.omni_motions import GoalMotion, OmniMotion, TwistMotion
 from daemon.runtime.poses import place_and_yaw
@@ -209,6 +210,16 @@ class OmniVehicle(Vehicle):
     def place(self) -> Pose:
         """Where it is by its odometry."""
         return self.senses.pose
+
+    def wheel_headings(self) -> dict[str, float]:
+        """Omni-wheels do not steer."""
+        assert isinstance(self.profile.vehicle, OmniGeometry)
+        return {name: math.radians(wheel.direction_deg) for name, wheel in self.profile.vehicle.wheels.items()}
+
+    @property
+    def turning_centre(self) -> Point | None:
+        """By the motion of the body."""
+        return centre_of_twist(*self.senses.motion)
 
     def status(self) -> dict[str, Any]:
         """Odometry, motion and acceleration of the centre."""

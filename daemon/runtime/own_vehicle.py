@@ -11,6 +11,7 @@ from canhelm.errors import DeviceFault, Refused, UsageError
 from daemon.loops.measurement import Measurement
 from daemon.loops.odometry import MAX_STEP_M, Pose, moved_along_arc
 from daemon.loops.own_vehicle import OwnVehicle, Twist
+from daemon.loops.turning_centre import Point, centre_of_twist
 from daemon.runtime.motions import Motion
 from daemon.runtime.own_motions import OwnMotion
 from daemon.runtime.poses import place_and_yaw
@@ -132,6 +133,11 @@ class OwnKindVehicle(Vehicle):
     def place(self) -> Pose:
         """Where it is by its odometry."""
         return self.pose
+
+    @property
+    def turning_centre(self) -> Point | None:
+        """By the motion of the body; the law says nothing of the wheels' places."""
+        return centre_of_twist(*self.motion_now)
 
     def status(self) -> dict[str, Any]:
         """Its kind, odometry and motion."""

@@ -7,7 +7,7 @@ import math
 from typing import Any, Final
 
 from canhelm.errors import Interlock, Refused, UsageError
-from daemon.loops.geometry import PAIR_NAMES
+from daemon.loops.geometry import PAIR_NAMES, Point, centre_of_rotation
 from daemon.loops.locked_drive import LockedDrive
 from daemon.loops.measurement import Measurement
 from daemon.loops.odometry import Odometry, Pose
@@ -25,6 +25,7 @@ from daemon.loops.paired_steer_target import (
 )
 from daemon.loops.paired_traction import rim_drives
 from daemon.loops.path_in_pieces import PiecePlanner
+from daemon.loops.turning_centre import if_near
 from daemon.runtime.motions import Motion
 from daemon.runtime.paired_steer_motions import PairedSteerMotion
 from daemon.runtime.path_building import build_path
@@ -166,6 +167,21 @@ class PairedSteerVehicle(Vehicle):
     def place(self) -> Pose:
         """Where it is by its odometry."""
         return self.odometry.pose
+
+    def wheel_headings(self) -> dict[str, float]:
+        """Those of the pairs, by their encoders."""
+        rear, front = (encoder.heading_rad for encoder in self.encoders)
+        return dict(zip(self.names, (rear, rear, front, front), strict=True))
+
+    @property
+    def turning_centre(self) -> Point | None:
+        """Where both pairs' axles point to, also at rest."""
+        rear, front = (encoder.heading_rad for encoder in self.encoders)
+        return if_near(centre_of_rotation(self.geometry, rear, front))
+
+    def smallest_radius_m(self, *, backward: bool) -> float | None:
+        """Zero: what cannot be steered is driven in parts, between which the robot stops."""
+        return 0.0
 
     def status(self) -> dict[str, Any]:
         """Headings and odometry."""

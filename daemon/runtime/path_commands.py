@@ -67,6 +67,10 @@ class PathVehicle(Protocol):
         """
         ...
 
+    def smallest_radius_m(self, *, backward: bool) -> float | None:
+        """Of an arc that is driven forward or backward in one go; None where it cannot be driven that way."""
+        ...
+
 
 class PathCommands:
     """The methods ``drive.path`` and ``path.add``, by name in :attr:`handlers`.

@@ -11,8 +11,9 @@ from daemon.loops.odometry import Odometry
 from daemon.loops.paired_steer import PairedSteerLaw
 from daemon.loops.paired_steer_piece import DrivenPiece, aimed, target_of
 from daemon.loops.paired_steer_target import PairedSteerTarget
-from daemon.loops.path import Path
+from daemon.loops.path import Path, Point, wrap
 from daemon.loops.path_in_pieces import distance
+from daemon.runtime.following import NO_LIMITS, Following
 from daemon.runtime.paired_steer_motions import PairedSteerMotion
 from daemon.runtime.path_commands import PathPlan
 from daemon.runtime.poses import place_and_heading
@@ -115,6 +116,7 @@ class PathInPieces(PairedSteerMotion):
         summary: of the plan.
 
     Attributes:
+        path: to be followed.
         number: of the piece under way, from 0.
         driven_m: largest distance of the robot's centre from the path so far, by odometry, piece by piece.
     """
@@ -129,8 +131,9 @@ class PathInPieces(PairedSteerMotion):
         summary: dict[str, Any],
     ) -> None:
         super().__init__("drive.path", robot.names, lease, robot.new_law(), None)
-        self._robot, self._path, self._pieces, self._speed_m_s = robot, path, pieces, speed_m_s
+        self._robot, self.path, self._pieces, self._speed_m_s = robot, path, pieces, speed_m_s
         self._summary = summary
+        self._way, self._nearest = path.pieces, pieces[0].first
         self.number = 0
         self.driven_m = [0.0] * len(pieces)
         self._go_on(0)
@@ -141,10 +144,32 @@ class PathInPieces(PairedSteerMotion):
         return super().step(measurement, dt_s)
 
     def _measure(self) -> None:
-        pose, piece = self._robot.odometry.pose, self._pieces[self.number]
-        stretch = self._path.pieces[piece.first : piece.last + 1]
-        off = min(distance(one, (pose.x_m, pose.y_m)) for one in stretch)
+        point, planned = self._place, self._pieces[self.number]
+        numbers = range(planned.first, planned.last + 1)
+        self._nearest = min(numbers, key=lambda number: distance(self._way[number], point))
+        off = distance(self._way[self._nearest], point)
         self.driven_m[self.number] = max(self.driven_m[self.number], off)
+
+    @property
+    def _place(self) -> Point:
+        pose = self._robot.odometry.pose
+        return (pose.x_m, pose.y_m)
+
+    def following(self) -> Following | None:
+        """Distance from the path, and the yaw against that of the planned piece; nothing ends the motion by them."""
+        piece, planned = self._way[self._nearest], self._pieces[self.number]
+        along, offset = piece.project(*self._place, piece.length_m / 2)
+        way = planned.piece.project(*self._place, planned.piece.length_m / 2)[0]
+        turned = self._robot.odometry.pose.yaw_rad - planned.yaw_rad - planned.piece.curvature * way
+        return Following(
+            self.path.way_to(self._nearest, min(max(along, 0.0), piece.length_m)),
+            self.path.length_m,
+            math.copysign(distance(piece, self._place), -offset if piece.backward else offset),
+            wrap(turned),
+            None,
+            piece.backward,
+            NO_LIMITS,
+        )
 
     def on_done(self, now_s: float) -> None:
         """A piece is over: go on with the next one that is a way at all, or end."""

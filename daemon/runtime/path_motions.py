@@ -11,9 +11,10 @@ from canhelm.errors import LimitExceeded, Refused
 from daemon.loops.articulated import ArticulatedVehicle
 from daemon.loops.measurement import Command, Measurement
 from daemon.loops.path import Path, wrap
-from daemon.loops.path_driving import DrivingStep, PathDriver, Phase, VehicleReading, at_begin
+from daemon.loops.path_driving import DrivingStep, PathDriver, Phase, VehicleReading, at_begin, error_limits
 from daemon.loops.path_speed import SpeedTuning
 from daemon.loops.steered_axle import SteeredAxleLaw
+from daemon.runtime.following import Following
 from daemon.runtime.motions import Motion
 from daemon.runtime.path_commands import PathPlan
 from daemon.runtime.poses import place_and_heading
@@ -54,6 +55,7 @@ class PathMotion(Motion):
         driver: its law.
 
     Attributes:
+        path: to be driven.
         record: of the last step; None before the first.
         limits_active: in the last step: of the speed, of the steering law, of the steered axle.
         limits_s: for how long each limit was active.
@@ -66,7 +68,7 @@ class PathMotion(Motion):
         self.limits_active: tuple[str, ...] = ()
         self.limits_s: defaultdict[str, float] = defaultdict(float)
         self.largest_error_m = 0.0
-        self._vehicle, self._path, self._driver = vehicle, path, driver
+        self._vehicle, self.path, self._driver = vehicle, path, driver
         self._axle = SteeredAxleLaw(vehicle.axle)
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
@@ -100,7 +102,7 @@ class PathMotion(Motion):
 
     def _result(self, now_s: float) -> dict[str, Any]:
         """Where the reference point is against the path's end, and how it went."""
-        last, vehicle = self._path.pieces[-1], self._vehicle
+        last, vehicle = self.path.pieces[-1], self._vehicle
         units = vehicle.kinematics.poses(vehicle.reading.truck, vehicle.reading.bending_rad)
         unit = units[-1 if last.backward else 0]
         end_m = last.length_m if math.isfinite(last.length_m) else last.project(unit.x_m, unit.y_m)[0]
@@ -114,6 +116,21 @@ class PathMotion(Motion):
             "duration_s": round(now_s - self.begun_s, 3),
         }
 
+    def following(self) -> Following | None:
+        """Errors of the last step."""
+        if self.record is None:
+            return None
+        step, vehicle = self.record.following, self._vehicle
+        return Following(
+            self.path.way_to(step.meeting.piece, step.meeting.along_m),
+            self.path.length_m,
+            step.errors.position_m,
+            step.errors.heading_rad,
+            step.errors.bending_rad,
+            step.backward,
+            error_limits(vehicle.kinematics, step.errors, vehicle.reading),
+        )
+
     def progress(self) -> dict[str, Any]:
         """Phase, where on the path, errors, and the limits that are active."""
         record = self.record
@@ -124,7 +141,7 @@ class PathMotion(Motion):
         return {
             "phase": str(record.phase),
             "section": record.section,
-            "piece": self._path.told(following.meeting.piece),
+            "piece": self.path.told(following.meeting.piece),
             "remaining_m": round(following.remaining_m, 3),
             "error_m": round(errors.position_m, 4),
             "heading_error_deg": round(math.degrees(errors.heading_rad), 2),

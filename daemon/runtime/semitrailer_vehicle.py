@@ -16,11 +16,13 @@ from daemon.loops.path_following import FollowingTuning
 from daemon.loops.path_speed import SpeedTuning
 from daemon.loops.truck_drive import TruckLaw, TruckTarget
 from daemon.loops.truck_odometry import TruckOdometry
+from daemon.loops.turning_centre import Point, centre_of_curvature
 from daemon.runtime.motions import Motion
 from daemon.runtime.path_building import build_path
 from daemon.runtime.path_commands import PathRequest
 from daemon.runtime.path_motions import FollowedPath, PathMotion
 from daemon.runtime.poses import place_and_yaw
+from daemon.runtime.shapes import FRONT, REAR, TRAILER, both_sides
 from daemon.runtime.steered_vehicle import SteeredVehicle
 from daemon.runtime.streams import streamed
 from daemon.runtime.truck_stream import TruckStream
@@ -167,6 +169,20 @@ class SemitrailerVehicle(SteeredVehicle):
     def place(self) -> Pose:
         """Where it is by its odometry."""
         return self.reading.truck
+
+    def wheel_headings(self) -> dict[str, float]:
+        """The front axle's steering angle; all other wheels roll straight ahead."""
+        straight = dict.fromkeys((*both_sides(REAR), *both_sides(TRAILER)), 0.0)
+        return {**dict.fromkeys(both_sides(FRONT), self.reading.steering_rad), **straight}
+
+    @property
+    def turning_centre(self) -> Point | None:
+        """Of the truck: beside its driven axle, by the steering angle, also at rest."""
+        return centre_of_curvature(self.kinematics.curvature(self.reading.steering_rad))
+
+    def smallest_radius_m(self, *, backward: bool) -> float | None:
+        """Of the truck's axle forward, of the trailer's backward, in stable motion that leaves the law a reserve."""
+        return 1.0 / (self._planned.stable_rear_curvature if backward else self._planned.stable_curvature)
 
     def status(self) -> dict[str, Any]:
         """Angles, jackknife margin and odometry of truck and trailer."""

@@ -15,6 +15,7 @@ from daemon.runtime.localising import Localiser
 from daemon.runtime.recorder import BusRecorder
 from daemon.runtime.run_recorder import RunRecorder
 from daemon.runtime.supervisor import Supervisor
+from daemon.runtime.vehicle_view import view_of
 from drivers.bus.contract import Bus
 
 EVENTS_SHOWN = 10
@@ -96,7 +97,7 @@ class Service:
             "nodes": [device.status() for device in supervisor.devices.all],
             "bricks": [{"name": name, **brick.status()} for name, brick in supervisor.devices.bricks.items()],
             "brakes": [brake.status() for brake in supervisor.devices.brakes.values()],
-            "vehicle": supervisor.vehicle.status(),
+            "vehicle": {**supervisor.vehicle.status(), **view_of(supervisor.vehicle, supervisor.motions.values())},
             "found": self.found,
             "localisation": self.localiser.status() if self.localiser else None,
             "holder": supervisor.holder(),

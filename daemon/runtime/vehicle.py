@@ -11,6 +11,7 @@ from canhelm.errors import LimitExceeded
 from daemon.loops.limits import Gate
 from daemon.loops.measurement import Command, Measurement
 from daemon.loops.odometry import Pose
+from daemon.loops.turning_centre import Point
 from daemon.runtime.motions import Motion
 from daemon.runtime.streams import valid_for_s
 from drivers.contract import Brake, BrakeState, Drive, SteeringEncoder
@@ -142,6 +143,15 @@ class Vehicle(ABC):
     @property
     def place(self) -> Pose | None:
         """Where it is by its odometry; None where it has none."""
+        return None
+
+    def wheel_headings(self) -> dict[str, float]:
+        """Heading of each wheel in the frame of its part [rad], by the names of ``vehicle.shape``."""
+        return {}
+
+    @property
+    def turning_centre(self) -> Point | None:
+        """Instantaneous centre of rotation in the body's frame; None where it moves straight, or is not known."""
         return None
 
     def observe(self, measurement: Measurement) -> None:
