@@ -348,8 +348,8 @@ class Connection(asyncio.Protocol):
         return self._seen()
 
     def _seen(self) -> dict[str, Any]:
-        more = self._server.rights.way_up(self._peer)
-        return {**self._server.status(), "role": self._peer.role, **({"role_remedy": more} if more else {})}
+        own = {"role": self._peer.role, "role_remedy": self._server.rights.way_up(self._peer), "lease": self._lease}
+        return {**self._server.status(), **{name: value for name, value in own.items() if value is not None}}
 
     async def _subscribe(self, params: dict[str, Any]) -> dict[str, Any]:
         self._stop_sampling()

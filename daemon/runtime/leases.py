@@ -64,7 +64,7 @@ class Leases:
     def told(self, lease: str) -> dict[str, Any]:
         """Who holds a lease, for programs. Raises Refused where it has run out or never was."""
         known = self._known(lease)
-        return {"client": known.client, **known.details}
+        return {"client": known.client, "lease": lease, **known.details}
 
     def renew(self, lease: str) -> None:
         """Keep a lease alive. Raises Refused where it has run out or never was."""

@@ -68,7 +68,7 @@ async def test_the_status_tells_who_has_the_robot() -> None:
     async with two_people() as (robot, alice, _):
         assert robot.app.service.status()["holder"] is None
         await driving(alice)
-        assert robot.app.service.status()["holder"] == {"client": "alice", **ALICE}
+        assert robot.app.service.status()["holder"] == {"client": "alice", "lease": "lease-1", **ALICE}
         await robot.app.service.call("stop", {}, None)
         assert robot.app.service.status()["holder"] is None
 
