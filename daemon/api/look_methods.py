@@ -12,7 +12,7 @@ LOOK_METHODS: Final = (
         "What the vehicle looks like from above and what it may do; it does not change while the daemon runs.",
         (),
         "type, parts (name, outline_m), wheels, limits, stream (parameters of drive.set that make sense), path "
-        "(smallest radii), reflectors, simulated",
+        "(smallest radii, lead_m), reflectors, simulated",
         Role.WATCH,
     ),
 )

@@ -77,7 +77,11 @@ class LookCommands:
         if not isinstance(vehicle, PathVehicle):
             return None
         forward, backward = (vehicle.smallest_radius_m(backward=way) for way in (False, True))
-        return {"smallest_radius_m": _rounded_up(forward), "smallest_radius_backward_m": _rounded_up(backward)}
+        return {
+            "smallest_radius_m": _rounded_up(forward),
+            "smallest_radius_backward_m": _rounded_up(backward),
+            "lead_m": _lead_m(vehicle.profile.vehicle),
+        }
 
     async def _active(self, params: Params, lease: str | None) -> dict[str, Any]:
         motion = followed(self._supervisor.motions.values())
@@ -106,6 +110,13 @@ def _told(piece: Piece) -> dict[str, Any]:
     if abs(turn) < SLIGHTEST_RAD:
         return {**where, "line_m": round(piece.length_m, 5)}
     return {**where, "arc_deg": round(math.degrees(turn), 5), "radius_m": round(1 / abs(piece.curvature), 5)}
+
+
+def _lead_m(geometry: object) -> float:
+    """From the reference point for driving backward ahead to the one for driving forward, the vehicle being straight."""
+    if not isinstance(geometry, SemitrailerGeometry):
+        return 0.0
+    return round(geometry.hitch_offset_m + geometry.trailer.length_m, 6)
 
 
 def _end(stick: tuple[float, float] | None) -> float | None:
