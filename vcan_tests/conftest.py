@@ -66,7 +66,7 @@ def _awake(request: pytest.FixtureRequest) -> Iterator[None]:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """A test of the kernel's bus, of the service or of the page fails where it can't run: a skipped one proves nothing."""
+    """A test that can't run here, fails: a skipped one proves nothing."""
     for mark, paths in NEEDS.items():
         missing = [str(path) for path in paths if item.get_closest_marker(mark) and not path.exists()]
         if missing:

@@ -1,6 +1,6 @@
 """A person at the page: one Chromium for all tests, a new context for each, and a look at what went wrong in it.
 
-Playwright is imported when a browser is asked for: where it is not installed, the other tests are collected all the same.
+Playwright is imported when a browser is asked for: where it is missing, the other tests are collected all the same.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ class Operator:
 
     def text(self, selector: str) -> str:
         """What stands in an element."""
-        return self.page.inner_text(selector)
+        return str(self.page.inner_text(selector))
 
     def sees(self, selector: str, words: str, within_s: float = TIMEOUT_S) -> None:
         """Wait until these words, a regular expression in any case, stand in an element."""

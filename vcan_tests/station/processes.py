@@ -60,7 +60,8 @@ class Child:
         """Look again and again until something is so. Raises AssertionError where it ends, or takes too long."""
         deadline = time.monotonic() + TIMEOUT_S
         while not happened():
-            assert self.process.poll() is None and time.monotonic() < deadline, self.log.read_text()
+            if self.process.poll() is not None or time.monotonic() > deadline:
+                raise AssertionError(self.log.read_text())
             select.select([], [], [], 0.02)
 
     def kill(self) -> None:

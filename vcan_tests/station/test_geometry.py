@@ -113,4 +113,3 @@ def test_the_page_projects_places_as_the_loops_do(operator: Operator, cases: lis
             assert point == pytest.approx(piece.point(piece.length_m / 3), abs=1e-9)
             for place, (along, offset) in zip(case["places"], found, strict=True):
                 assert (along, offset) == pytest.approx(piece.project(*place), abs=1e-8)
-

@@ -110,5 +110,3 @@ def wire_to(port: int) -> Iterator[Wire]:
         yield wire
     finally:
         wire.close()
-
-
