@@ -121,6 +121,8 @@ class PathInPieces(PairedSteerMotion):
         driven_m: largest distance of the robot's centre from the path so far, by odometry, piece by piece.
     """
 
+    path: Path
+
     def __init__(
         self,
         lease: str | None,

@@ -62,6 +62,8 @@ class PathMotion(Motion):
         largest_error_m: of the position, while driving.
     """
 
+    path: Path
+
     def __init__(self, lease: str | None, vehicle: FollowingVehicle, path: Path, driver: PathDriver) -> None:
         super().__init__(KIND, vehicle.names, lease)
         self.record: DrivingStep | None = None
