@@ -41,8 +41,8 @@ _TALK = (
         "status",
         "State at a glance.",
         (),
-        "state, message, nodes, brakes, vehicle, holder (who has the robot), role and lease (the caller's), localisation, "
-        "bus, cycle, recording, events, role_remedy (how the caller gets the next role)",
+        "state, message, nodes, brakes, vehicle, holder (who has the robot), role and lease (the caller's), "
+        "localisation, bus, cycle, recording, events, role_remedy (how the caller gets the next role)",
         Role.WATCH,
     ),
     Method(

@@ -36,6 +36,7 @@ function build() {
     const element = panel.create(station);
     element.classList.add("panel");
     element.dataset.panel = name;
+    element.setAttribute("aria-label", title);
     const tab = h("a", { href: `#${name}`, class: "tab", "data-tab": name }, title);
     tabs.append(tab);
     main.append(element);

@@ -28,6 +28,7 @@ const STANDING = {
  */
 export function reasonAgainst(station, method) {
   if (!station.connected) return "no connection to the robot";
+  if (!station.status) return "no word from the robot yet";
   const told = station.methods.get(method);
   if (!told && !method.startsWith("station.")) return `this daemon is too old for ${method}`;
   return (

@@ -1,0 +1,192 @@
+/** Single motions and the brakes: each a row of inputs and a button, disabled with the reason where there is none. */
+
+import { allow, attribute, h, number, text } from "./dom.js";
+
+const key = (name) => name.replaceAll(/[^a-z]/g, "-");
+
+/** An input for a number, with its label. */
+function field(name, label, value, { min, max, step = "any" } = {}) {
+  const input = h("input", { type: "number", id: `motion-${name}`, value, min, max, step, inputmode: "decimal" });
+  return { input, element: h("label", { class: "field", for: input.id }, label, input) };
+}
+
+function numberIn(input) {
+  return input.value.trim() === "" ? null : input.valueAsNumber;
+}
+
+/** A row that calls one method with what stands in its inputs. */
+class Row {
+  #station;
+  #method;
+  #button;
+  #reason = h("p", { class: "reason" });
+
+  constructor(station, method, { title, verb, fields, parameters }) {
+    this.#station = station;
+    this.#method = method;
+    this.#button = h("button", { type: "submit" }, verb);
+    const inputs = h("div", { class: "row bottom" }, fields.map((each) => each.element), this.#button);
+    this.#reason.id = `why-${key(method)}`;
+    this.#button.setAttribute("aria-describedby", this.#reason.id);
+    this.element = h("form", { "data-motion": method }, h("h4", {}, title), inputs, this.#reason);
+    this.element.addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.#begin(parameters());
+    });
+  }
+
+  show() {
+    const reason = this.#station.cannot(this.#method);
+    allow(this.#button, reason);
+    text(this.#reason, reason ? `Not now: ${reason}` : "");
+    this.#reason.hidden = !reason;
+  }
+
+  async #begin(parameters) {
+    const done = await this.#station.attempt(this.#station.move(this.#method, parameters), this.#method);
+    if (done) this.#station.say(`${this.#method}: done${done.result ? `, ${done.result}` : ""}`);
+  }
+}
+
+function rows(station) {
+  const pair = h("select", { id: "motion-pair" }, h("option", {}, "front"), h("option", {}, "rear"));
+  const angle = field("angle", "heading [deg]", "0");
+  const rate = field("rate", "yaw rate [deg/s]", "20");
+  const time = field("time", "time [s]", "3", { min: 0.1 });
+  const [x, y] = [field("x", "x [m]", "0.5"), field("y", "y [m]", "0")];
+  const heading = field("heading", "heading [deg]", "");
+  const speed = field("speed", "speed [m/s]", "", { min: 0.001 });
+  return [
+    new Row(station, "steer", {
+      title: "Steer a pair of wheels",
+      verb: "Steer",
+      fields: [{ element: h("label", { class: "field", for: pair.id }, "pair", pair) }, angle],
+      parameters: () => ({ pair: pair.value, angle_deg: numberIn(angle.input) }),
+    }),
+    new Row(station, "drive.rotate", {
+      title: "Turn about its own centre",
+      verb: "Rotate",
+      fields: [rate, time],
+      parameters: () => ({ rate_deg_s: numberIn(rate.input), duration_s: numberIn(time.input) }),
+    }),
+    new Row(station, "drive.to", {
+      title: "Drive to a place of the frame that began with the daemon",
+      verb: "Drive to",
+      fields: [x, y, heading, speed],
+      parameters: () => ({
+        x_m: numberIn(x.input),
+        y_m: numberIn(y.input),
+        heading_deg: numberIn(heading.input),
+        speed_m_s: numberIn(speed.input),
+      }),
+    }),
+  ];
+}
+
+/** Buttons that call a method once for each of some names. */
+function buttons(station, told) {
+  return told.map(([method, verb, parameter, names]) => {
+    const button = h("button", { type: "button", "data-method": method }, verb);
+    button.addEventListener("click", async () => {
+      const calls = names().map((name) => station.call(method, { [parameter]: name }, { timeout_ms: 10_000 }));
+      await station.attempt(Promise.all(calls), verb);
+    });
+    return { method, button };
+  });
+}
+
+const drives = (station) => (station.status?.nodes ?? []).filter((node) => "target_speed_m_s" in node);
+
+function wordsOfDrives(station) {
+  const all = drives(station);
+  const enabled = all.filter((node) => node.state === "enabled");
+  return all.length ? `${enabled.length} of ${all.length} enabled` : "no drives";
+}
+
+function wordsOfBrakes(station) {
+  return (station.status?.brakes ?? []).map((brake) => `${brake.name}: ${brake.state}`).join(", ");
+}
+
+/** Power of the drives, and brakes. */
+function powerAndBrakes(station) {
+  const names = () => drives(station).map((node) => node.name);
+  const power = buttons(station, [
+    ["motor.enable", "Enable drives", "node", names],
+    ["motor.disable", "Disable drives", "node", names],
+  ]);
+  const brakes = ["front", "rear"].flatMap((pair) =>
+    buttons(station, [
+      ["brake.release", `Release ${pair}`, "pair", () => [pair]],
+      ["brake.engage", `Engage ${pair}`, "pair", () => [pair]],
+    ]).map((each) => ({ ...each, pair })),
+  );
+  const [powered, braked] = [h("output", { class: "muted" }), h("output", { class: "muted" })];
+  const element = h(
+    "div",
+    { class: "stack" },
+    h("div", { class: "row" }, power.map((each) => each.button), powered),
+    h("div", { class: "row" }, brakes.map((each) => each.button), braked),
+  );
+  const show = () => {
+    for (const { method, button, pair } of [...power, ...brakes]) {
+      const reason = station.cannot(method) ?? reasonOfPair(station, pair);
+      allow(button, reason);
+      if (pair) attribute(button, "aria-label", reason ? `${button.textContent} (${reason})` : null);
+    }
+    text(powered, wordsOfDrives(station));
+    text(braked, wordsOfBrakes(station) || "this vehicle has no brakes");
+  };
+  return { element, show };
+}
+
+function reasonOfPair(station, pair) {
+  const has = (station.status?.brakes ?? []).map((brake) => brake.name);
+  return !pair || has.includes(pair) ? null : `there is no brake ${pair}: ${has.join(", ")}`;
+}
+
+/** The motions that are under way, whoever has begun them, each with a button that ends it by its ramp. */
+function running(station) {
+  const element = h("ul", { class: "running" });
+  const show = () => {
+    const motions = station.status?.motions ?? [];
+    const told = motions.map((motion) => motion.motion).join();
+    if (element.dataset.told !== told) {
+      element.dataset.told = told;
+      element.replaceChildren(...motions.map((motion) => item(station, motion)));
+    }
+    motions.forEach((motion, i) => text(element.children[i].querySelector("span"), wordsOfMotion(motion)));
+  };
+  return { element, show };
+}
+
+function item(station, { motion, kind }) {
+  const end = h("button", { type: "button", "aria-label": `End ${kind}` }, "End");
+  end.addEventListener("click", () =>
+    station.attempt(station.call("motion.stop", { motion }, { timeout_ms: 10_000 }), `ending ${kind}`),
+  );
+  return h("li", { class: "row" }, h("span"), end);
+}
+
+function wordsOfMotion({ motion, kind, phase, speed_m_s }) {
+  const speed = speed_m_s == null ? "" : `, ${number(speed_m_s, 2)} m/s`;
+  return `${kind} (motion ${motion})${phase ? `: ${phase}` : ""}${speed}`;
+}
+
+/**
+ * @param {object} station see station.js
+ * @returns {{element: HTMLElement, show: function(): void}} what is shown, and how it is brought up to date
+ */
+export function createMotions(station) {
+  const all = rows(station);
+  const power = powerAndBrakes(station);
+  const list = running(station);
+  const element = h(
+    "div",
+    { class: "stack" },
+    list.element,
+    h("h3", {}, "Power and brakes"),
+    power.element,
+    h("details", {}, h("summary", {}, "Single motions"), all.map((row) => row.element)),
+  );
+  return { element, show: () => [...all, power, list].forEach((each) => each.show()) };
+}

@@ -1,0 +1,150 @@
+/** Sliders for driving: speed only while it is held, everything else stays where it is put. */
+
+import { allow, h, number, text } from "./dom.js";
+
+const LABELS = { speed: "Speed", direction: "Direction", yaw_rate: "Yaw rate", steering: "Steering" };
+const LACKS = {
+  speed: "this vehicle is not driven by hand",
+  direction: "its wheels all turn with the vehicle: it cannot drive aside",
+  yaw_rate: "it turns by its steering, not by a rate",
+  steering: "it has no steered wheels",
+};
+const DIGITS = { "m/s": 2, deg: 0, "deg/s": 0 };
+const STEPS = { "m/s": 0.01, deg: 1, "deg/s": 1 };
+/** Share of the vehicle's own limit that a person begins with. */
+const FIRST_SHARE = 0.5;
+
+class Slider {
+  #range = null;
+  #lack;
+
+  constructor(name, label, lack) {
+    this.#lack = lack;
+    this.shown = h("output", { for: `slider-${name}` });
+    this.input = h("input", { type: "range", id: `slider-${name}`, min: -1, max: 1, step: 0.01, value: 0 });
+    this.why = h("span", { class: "reason", id: `why-${name}` });
+    this.input.setAttribute("aria-describedby", this.why.id);
+    const words = h("span", { class: "name" }, h("label", { for: this.input.id }, label), this.shown);
+    this.element = h("div", { class: "slider" }, words, this.input, this.why);
+    this.input.addEventListener("input", () => this.show());
+  }
+
+  /** The ends of this vehicle; null where it has no such command. */
+  use(range, value = 0) {
+    this.#range = range;
+    if (range) {
+      Object.assign(this.input, { min: range.least, max: range.full, step: STEPS[range.unit], value });
+    }
+    this.show();
+  }
+
+  get value() {
+    return this.input.valueAsNumber;
+  }
+
+  put(value) {
+    this.input.value = value;
+    this.show();
+  }
+
+  show() {
+    const { unit } = this.#range ?? {};
+    const told = unit ? `${number(this.value, DIGITS[unit])} ${unit}` : "–";
+    text(this.shown, told);
+    this.input.setAttribute("aria-valuetext", told);
+  }
+
+  allow(reason) {
+    const why = this.#range ? reason : this.#lack;
+    allow(this.input, why);
+    text(this.why, this.#range ? "" : why);
+  }
+}
+
+export class Sliders {
+  #sliders = Object.fromEntries(Object.entries(LABELS).map(([name, label]) => [name, new Slider(name, label, LACKS[name])]));
+  #fastest = new Slider("fastest", "My highest speed", LACKS.speed);
+  #ranges = {};
+  #held = false;
+  #onHold;
+  #onLetGo;
+
+  /** @param {{onHold: function(): void, onLetGo: function(): void}} listener hears of the speed slider */
+  constructor({ onHold, onLetGo }) {
+    this.#onHold = onHold;
+    this.#onLetGo = onLetGo;
+    const { speed, ...others } = this.#sliders;
+    const hint = h("p", { class: "reason" }, "Speed counts while its slider is held, and springs back.");
+    const middle = h("button", { type: "button", onclick: () => this.#toMiddle() }, "All to the middle");
+    const elements = [this.#fastest, speed, ...Object.values(others)].map((slider) => slider.element);
+    this.element = h("div", { class: "sliders" }, elements, h("div", { class: "row" }, middle, hint));
+    this.#listen(speed.input);
+  }
+
+  /** Commands of this vehicle, with their ends. */
+  use(ranges) {
+    this.#ranges = ranges;
+    for (const [name, slider] of Object.entries(this.#sliders)) slider.use(ranges[name] ?? null);
+    const { speed } = ranges;
+    this.#fastest.use(speed ? { least: 0, full: speed.full, unit: speed.unit } : null, FIRST_SHARE * (speed?.full ?? 0));
+  }
+
+  /** What the sliders command, by command; those that the vehicle has not are left out. */
+  get commands() {
+    const known = Object.entries(this.#sliders).filter(([name]) => this.#ranges[name]);
+    return Object.fromEntries(known.map(([name, slider]) => [name, slider.value]));
+  }
+
+  /** A person's own highest speed [m/s]. */
+  get fastest() {
+    return this.#fastest.value;
+  }
+
+  /** Commands of a stick, whose way ends at a person's own highest speed. */
+  slowed(commands) {
+    const share = this.#ranges.speed ? this.fastest / this.#ranges.speed.full : 0;
+    const speeds = ["speed", "sideways"].filter((name) => name in commands);
+    return { ...commands, ...Object.fromEntries(speeds.map((name) => [name, commands[name] * share])) };
+  }
+
+  /** Why they cannot be used; null where they can. */
+  allow(reason) {
+    for (const slider of Object.values(this.#sliders)) slider.allow(reason);
+    this.#fastest.allow(null);
+  }
+
+  /** Let go of the speed. */
+  drop() {
+    this.#held = false;
+    this.#sliders.speed.put(0);
+  }
+
+  #toMiddle() {
+    for (const slider of Object.values(this.#sliders)) slider.put(0);
+  }
+
+  #listen(speed) {
+    const hold = () => {
+      this.#held = true;
+      this.#onHold();
+    };
+    const letGo = () => {
+      if (!this.#held) return;
+      this.drop();
+      this.#onLetGo();
+    };
+    speed.addEventListener("pointerdown", hold);
+    speed.addEventListener("keydown", (event) => this.#byKey(event, hold));
+    for (const end of ["pointerup", "pointercancel", "keyup", "blur"]) speed.addEventListener(end, letGo);
+    // a value that comes without a hold (a wheel, an aid) does not stay
+    speed.addEventListener("change", () => this.#held || this.drop());
+    speed.addEventListener("input", () => this.#held || this.drop());
+  }
+
+  /** An arrow that is held moves the slider on and on; one that is still down since it was dropped does nothing. */
+  #byKey(event, hold) {
+    if (!/^(Arrow|Page|Home|End)/.test(event.code)) return;
+    if (event.repeat && !this.#held) event.preventDefault();
+    else if (!event.repeat) hold();
+  }
+}
