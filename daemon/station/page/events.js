@@ -63,7 +63,6 @@ function rowOf({ robot, at_ms, severity, source, message, remedy }) {
 class EventsPanel {
   #station;
   #log = new EventLog();
-  #rows = new Map();
   #unread = 0;
   #list = h("ol", { class: "events", "aria-label": "Events, the newest first" });
   #told = h("p", { class: "aside", role: "status" });
@@ -92,31 +91,28 @@ class EventsPanel {
     this.#read();
     const latest = events?.at(-1);
     if (!latest || this.#log.knows(latest, this.#station.robot)) return;
-    this.#take(events, (event) => Date.now() - 1000 * (time_s - event.time_s));
+    const now_ms = Date.now();
+    this.#take(events, (event) => now_ms - 1000 * (time_s - event.time_s));
   }
 
   #take(events, timeOf) {
-    const added = events.map((event) => this.#log.add(event, this.#station.robot, timeOf(event))).filter(Boolean);
+    const added = events.map((event) => this.#add(event, timeOf(event))).filter(Boolean);
     if (!added.length) return;
-    for (const event of added) this.#insert(event);
-    for (const [event, row] of this.#rows) if (!this.#log.events.includes(event)) this.#drop(event, row);
     if (!this.#isVisible()) this.#unread += added.filter((event) => event.severity !== "info").length;
     this.#tellUnread();
     this.#tellCount();
   }
 
-  #insert(event) {
-    const at = this.#log.events.indexOf(event);
-    if (at < 0) return;
-    const row = rowOf(event);
-    row.hidden = !this.#isWanted(event);
-    this.#rows.set(event, row);
-    this.#list.insertBefore(row, this.#list.children[at] ?? null);
-  }
-
-  #drop(event, row) {
-    row.remove();
-    this.#rows.delete(event);
+  /** The rows stand as their events do. */
+  #add(event, at_ms) {
+    const added = this.#log.add(event, this.#station.robot, at_ms);
+    const place = this.#log.events.indexOf(added);
+    if (place < 0) return null;
+    const row = rowOf(added);
+    row.hidden = !this.#isWanted(added);
+    this.#list.insertBefore(row, this.#list.children[place] ?? null);
+    if (this.#list.childElementCount > this.#log.events.length) this.#list.lastElementChild.remove();
+    return added;
   }
 
   #isWanted({ severity, source, message, remedy }) {
@@ -125,7 +121,7 @@ class EventsPanel {
   }
 
   #filter() {
-    for (const [event, row] of this.#rows) row.hidden = !this.#isWanted(event);
+    this.#log.events.forEach((event, at) => (this.#list.children[at].hidden = !this.#isWanted(event)));
     this.#tellCount();
   }
 
