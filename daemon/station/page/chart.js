@@ -1,0 +1,176 @@
+/** One chart of numbers over the last minute, on a canvas, with its newest values as text. */
+
+import { font, palette, sharp } from "./canvas.js";
+import { attribute, h, number, redraw, text } from "./dom.js";
+import { niceStep } from "./map_view.js";
+
+export const SPAN_S = 60;
+const CAPACITY = 2048;
+const GAP_S = 0.5;
+const TICK_S = 10;
+const MARGIN = { left: 46, right: 8, top: 8, bottom: 20 };
+const ROWS = 4;
+const LIMIT_SHARE = 1.15;
+const DASHES = [[], [6, 4], [2, 3], [8, 3, 2, 3]];
+
+/** Times and values of the last minute, in memory that does not grow. */
+class Ring {
+  #columns;
+  #next = 0;
+  #count = 0;
+
+  constructor(series) {
+    this.#columns = Array.from({ length: series + 1 }, () => new Float64Array(CAPACITY));
+  }
+
+  clear() {
+    [this.#next, this.#count] = [0, 0];
+  }
+
+  add(row) {
+    row.forEach((value, column) => {
+      this.#columns[column][this.#next] = value ?? NaN;
+    });
+    this.#next = (this.#next + 1) % CAPACITY;
+    this.#count = Math.min(this.#count + 1, CAPACITY);
+  }
+
+  /** Call with time and value of a series, oldest first, from a time on. */
+  each(series, from_s, visit) {
+    for (let number = 0; number < this.#count; number += 1) {
+      const place = (this.#next - this.#count + number + CAPACITY) % CAPACITY;
+      const time_s = this.#columns[0][place];
+      if (time_s >= from_s) visit(time_s, this.#columns[series + 1][place]);
+    }
+  }
+}
+
+export class Chart {
+  #ring;
+  #now_s = null;
+  #limit = null;
+
+  /**
+   * @param station for whether values are stale.
+   * @param options title, unit, digits, names (of the series), least (half the height of an empty chart).
+   */
+  constructor(station, { title, unit, digits, names, least }) {
+    Object.assign(this, { station, title, unit, digits, names, least });
+    this.#ring = new Ring(names.length);
+    this.canvas = h("canvas", { class: "chart-canvas", role: "img", "aria-label": `${title}: no values yet` });
+    this.newest = h("output", { "aria-label": `${title}, newest` });
+    const caption = h("figcaption", {}, h("span", {}, `${title} [${unit}] `), this.newest);
+    this.element = h("figure", { class: "chart" }, caption, this.canvas);
+    this.changed = redraw(this.element, () => this.#draw());
+    this.#surface = sharp(this.canvas, this.changed);
+    station.on("stale", this.changed);
+  }
+
+  #surface;
+
+  /** Take the values of a moment; null where there is none. A clock that goes back begins anew. */
+  add(time_s, values, limit = null) {
+    if (this.#now_s !== null && time_s < this.#now_s) this.clear();
+    if (time_s === this.#now_s) return;
+    [this.#now_s, this.#limit] = [time_s, limit];
+    this.#ring.add([time_s, ...values]);
+    this.#tell(values);
+    this.changed();
+  }
+
+  clear() {
+    this.#ring.clear();
+    [this.#now_s, this.#limit] = [null, null];
+    text(this.newest, "");
+    attribute(this.canvas, "aria-label", `${this.title}: no values yet`);
+    this.changed();
+  }
+
+  #tell(values) {
+    const told = this.names.map((name, index) => `${name && `${name} `}${number(values[index], this.digits)} ${this.unit}`);
+    const limit = this.#limit === null ? "" : `, limit ${number(this.#limit, this.digits)} ${this.unit}`;
+    text(this.newest, told.join(", ") + limit);
+    attribute(this.canvas, "aria-label", `${this.title} over the last ${SPAN_S} s; its newest values stand above`);
+  }
+
+  // --- drawing --------------------------------------------------------------------------------------------------
+
+  #draw() {
+    const { context, width, height } = this.#surface();
+    if (width < MARGIN.left + MARGIN.right + 20) return;
+    const colours = palette();
+    context.font = font(11);
+    const frame = this.#frame(width, height);
+    this.#drawAxes(context, colours, frame);
+    if (this.#limit !== null) this.#drawLimits(context, colours, frame);
+    const now_s = this.#now_s;
+    if (now_s === null) return;
+    this.names.forEach((_, series) => this.#drawSeries(context, colours, frame, series, now_s - SPAN_S));
+  }
+
+  /** Where times and values are on the canvas; the values' axis has zero in its middle and reaches to the limits. */
+  #frame(width, height) {
+    let most = Math.max(this.least, (this.#limit ?? 0) * LIMIT_SHARE);
+    const from_s = (this.#now_s ?? 0) - SPAN_S;
+    const see = (_, value) => {
+      most = Math.max(most, Math.abs(value) || 0);
+    };
+    this.names.forEach((_, series) => this.#ring.each(series, from_s, see));
+    const [left, right, top, bottom] = [MARGIN.left, width - MARGIN.right, MARGIN.top, height - MARGIN.bottom];
+    const x = (time_s) => left + (right - left) * (time_s - from_s) / SPAN_S;
+    const y = (value) => (top + bottom) / 2 - (bottom - top) / 2 * value / most;
+    return { left, right, top, bottom, most, from_s, x, y };
+  }
+
+  #drawAxes(context, colours, { left, right, top, bottom, most, from_s, x, y }) {
+    const step = niceStep(2 * most / ROWS);
+    [context.strokeStyle, context.fillStyle, context.lineWidth] = [colours.line, colours.muted, 1];
+    [context.textAlign, context.textBaseline] = ["right", "middle"];
+    for (let count = -Math.floor(most / step); count * step <= most; count += 1) {
+      rule(context, [left, y(count * step)], [right, y(count * step)]);
+      context.fillText(tick(count * step, step), left - 5, y(count * step));
+    }
+    [context.textAlign, context.textBaseline] = ["center", "top"];
+    for (let ago_s = 0; ago_s <= SPAN_S; ago_s += TICK_S) {
+      const at = x(from_s + SPAN_S - ago_s);
+      rule(context, [at, top], [at, bottom]);
+      if (ago_s % (2 * TICK_S) === 0) context.fillText(ago_s ? `−${ago_s} s` : "now", Math.min(at, right - 12), bottom + 4);
+    }
+  }
+
+  #drawLimits(context, colours, { left, right, y }) {
+    [context.strokeStyle, context.fillStyle, context.lineWidth] = [colours.bad, colours.bad, 1.5];
+    context.setLineDash([7, 4]);
+    for (const limit of [this.#limit, -this.#limit]) rule(context, [left, y(limit)], [right, y(limit)]);
+    context.setLineDash([]);
+    [context.textAlign, context.textBaseline] = ["left", "top"];
+    context.fillText(`limit ${number(this.#limit, this.digits)} ${this.unit}`, left + 4, y(this.#limit) + 2);
+  }
+
+  #drawSeries(context, colours, { x, y }, series, from_s) {
+    context.strokeStyle = this.station.stale ? colours.muted : colours.series[series];
+    context.lineWidth = 2;
+    context.setLineDash(DASHES[series]);
+    context.beginPath();
+    let before_s = -Infinity;
+    this.#ring.each(series, from_s, (time_s, value) => {
+      if (Number.isNaN(value)) return;
+      context[time_s - before_s > GAP_S ? "moveTo" : "lineTo"](x(time_s), y(value));
+      before_s = time_s;
+    });
+    context.stroke();
+    context.setLineDash([]);
+  }
+}
+
+function rule(context, from, to) {
+  context.beginPath();
+  context.moveTo(...from);
+  context.lineTo(...to);
+  context.stroke();
+}
+
+/** A number at an axis, with so many digits as its steps need. */
+function tick(value, step) {
+  return number(value, Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
+}

@@ -1,0 +1,135 @@
+/** Having a path driven: forwards or backwards, how fast, how far it is, and what came of it. */
+
+import { allow, h, number, text } from "./dom.js";
+import { field, put } from "./fields.js";
+
+const METHOD = "drive.path";
+
+/** The controls under the editor; `speed_m_s()` and `lasts(length_m)` are of use to the check. */
+export class Following {
+  #driving = false;
+
+  constructor(station, editor, check) {
+    [this.station, this.editor, this.check] = [station, editor, check];
+    const limits = { min: 0.001, placeholder: "largest" };
+    this.speed = field("Speed in metres a second", limits, () => check().look());
+    this.ways = ["forwards", "backwards"].map((way) => this.#way(way));
+    const drive = { type: "button", class: "main", id: "path-drive", onclick: () => this.#drive() };
+    this.driveButton = h("button", drive, "Drive the path");
+    this.stopButton = h("button", { type: "button", id: "path-stop", onclick: () => this.#stop() }, "Stop the drive");
+    this.reason = h("p", { class: "reason" });
+    this.bar = h("progress", { max: 1, value: 0, "aria-label": "Way driven" });
+    this.told = h("p", { class: "value" });
+    this.result = h("p", { role: "status" });
+    this.progress = h("div", { class: "path-progress", hidden: true }, this.bar, this.told);
+    this.element = this.#fieldset();
+    document.addEventListener("visibilitychange", () => this.#watchTab());
+  }
+
+  #way(way) {
+    const backward = way === "backwards";
+    const input = h("input", { type: "radio", name: "path-way", value: way, onchange: () => this.editor.set("exchanged", backward) });
+    input.checked = !backward;
+    return input;
+  }
+
+  #fieldset() {
+    const ways = this.ways.map((input) => h("label", { class: "tick" }, input, input.value));
+    return h(
+      "fieldset",
+      { class: "path-drive" },
+      h("legend", {}, "Drive it"),
+      h("div", { class: "row bottom" }, ...ways, h("label", { class: "field" }, "Speed [m/s]", this.speed)),
+      h("div", { class: "row" }, this.driveButton, this.stopButton),
+      this.reason,
+      h("p", { class: "muted" }, "Backwards exchanges forward and backward in the whole path. The page holds the drive: "
+        + "hide or close it, and the vehicle comes to rest."),
+      this.progress,
+      this.result,
+    );
+  }
+
+  /** The speed that is asked for; null for as fast as the vehicle may. */
+  speed_m_s() {
+    return this.speed.value === "" || !this.speed.checkValidity() ? null : this.speed.valueAsNumber;
+  }
+
+  /** How long a way lasts at least, in words. */
+  lasts(length_m) {
+    const { limits } = this.station.shape ?? {};
+    const fastest = this.editor.exchanged && limits?.backward_m_s ? limits.backward_m_s : limits?.speed_m_s;
+    const speed_m_s = Math.min(this.speed_m_s() ?? Infinity, fastest ?? Infinity);
+    return Number.isFinite(speed_m_s) && speed_m_s > 0 ? `at least ${number(length_m / speed_m_s, 0)} s` : "";
+  }
+
+  // --- driving --------------------------------------------------------------------------------------------------
+
+  async #drive() {
+    this.#driving = true;
+    text(this.result, "");
+    this.show();
+    const result = await this.station.attempt(this.station.move(METHOD, this.check().params()), "Path");
+    this.#driving = false;
+    text(this.result, result ? inWords(result) : "The path was not driven to its end.");
+    this.show();
+  }
+
+  async #stop() {
+    await this.station.attempt(this.station.call("stop", {}, { timeout_ms: 15_000 }), "Stop");
+  }
+
+  /** Nobody looks after a robot from a page that is hidden: let go of it, without waiting for the lease to run out. */
+  #watchTab() {
+    if (!document.hidden || !this.#driving) return;
+    this.station.attempt(this.station.call("lease.close", {}, { timeout_ms: 15_000 }), "Letting go");
+    this.station.say("The page was hidden: the vehicle comes to rest", "warning", "keep the page in sight while it drives");
+  }
+
+  // --- showing --------------------------------------------------------------------------------------------------
+
+  show() {
+    const { exchanged, entries } = this.editor;
+    for (const input of this.ways) input.checked = (input.value === "backwards") === exchanged;
+    const against = this.#against(entries);
+    allow(this.driveButton, against);
+    this.stopButton.disabled = !this.station.connected;
+    text(this.reason, this.#driving ? "" : against ?? "");
+    this.#showProgress(this.station.status?.vehicle?.following ?? null);
+  }
+
+  #against(entries) {
+    if (this.#driving) return "it is driving";
+    if (!entries.length) return "there is no path yet";
+    const { kind, message } = this.check().verdict;
+    return this.station.cannot(METHOD) ?? (kind === "bad" ? message : null);
+  }
+
+  #showProgress(following) {
+    this.progress.hidden = !following;
+    if (!following) return;
+    const { progress_m, length_m, error_m, backward } = following;
+    const share = length_m > 0 ? Math.min(1, Math.max(0, progress_m / length_m)) : 0;
+    if (Math.abs(this.bar.value - share) > 0.002) this.bar.value = share;
+    const way = `${number(progress_m)} of ${number(length_m)} m ${backward ? "backward" : "forward"}`;
+    text(this.told, `${way}, ${number(Math.abs(error_m) * 100, 1)} cm beside the path`);
+  }
+
+  /** The next robot has another limit. */
+  forget() {
+    put(this.speed, "");
+    text(this.result, "");
+  }
+}
+
+/** The result of a drive for people; vehicles that stop on the way tell other numbers. */
+function inWords({ duration_s, end_error_m, error_m, largest_error_m, driven_deviation_m }) {
+  const cm = (value_m) => `${number(value_m * 100, 1)} cm`;
+  const end_m = end_error_m ?? error_m;
+  const most_m = largest_error_m ?? driven_deviation_m;
+  const parts = [
+    `Arrived after ${number(duration_s, 1)} s`,
+    end_m != null && `${cm(end_m)} beside the end`,
+    most_m != null && `at most ${cm(most_m)} beside the path`,
+  ];
+  return `${parts.filter(Boolean).join(", ")}.`;
+}

@@ -1,0 +1,173 @@
+/** Paths that are kept: load, save, delete, import, export, and recording the way that is driven. */
+
+import { allow, h, text } from "./dom.js";
+
+const NAME = "[A-Za-z0-9][A-Za-z0-9_\\-]{0,59}";
+
+/** The controls above the editor. */
+export class PathFiles {
+  #recording = false;
+
+  constructor(station, editor) {
+    [this.station, this.editor] = [station, editor];
+    this.select = h("select", { "aria-label": "Kept paths", onchange: () => this.show() });
+    this.name = h("input", { type: "text", pattern: NAME, maxlength: 60, "aria-label": "Name of the path", oninput: () => this.show() });
+    this.file = h("input", { type: "file", accept: ".json,application/json", class: "unseen", "aria-label": "Path file", tabindex: -1 });
+    this.file.addEventListener("change", () => this.#import());
+    this.buttons = {
+      load: this.#button("Load", () => this.#load()),
+      remove: this.#button("Delete", () => this.#delete()),
+      save: this.#button("Save", () => this.#save()),
+      importing: this.#button("Import…", () => this.file.click()),
+      exporting: this.#button("Export", () => this.#export()),
+      record: this.#button("Record a drive", () => this.#record()),
+    };
+    this.told = h("p", { class: "reason", role: "status" });
+    this.element = this.#fieldset();
+    station.on("connected", () => this.#connected());
+    station.on("robot", () => this.#forget());
+  }
+
+  #button(title, act) {
+    return h("button", { type: "button", onclick: act }, title);
+  }
+
+  #fieldset() {
+    const { load, remove, save, importing, exporting, record } = this.buttons;
+    return h(
+      "fieldset",
+      {},
+      h("legend", {}, "Kept paths"),
+      h("div", { class: "row bottom" }, h("label", { class: "field" }, "Path", this.select), load, remove),
+      h("div", { class: "row bottom" }, h("label", { class: "field" }, "Name", this.name), save, importing, exporting, this.file),
+      h("div", { class: "row" }, record),
+      this.told,
+    );
+  }
+
+  show() {
+    const { station, buttons, select, editor, name } = this;
+    const chosen = select.value ? null : "no path is kept yet";
+    const empty = editor.entries.length ? null : "there is no path yet";
+    const named = name.value && name.checkValidity() ? null : "give it a name: letters, digits, - and _";
+    allow(buttons.load, chosen ?? station.cannot("station.path.read"));
+    allow(buttons.remove, chosen ?? station.cannot("station.path.delete"));
+    allow(buttons.save, empty ?? named ?? station.cannot("station.path.write"));
+    allow(buttons.exporting, empty);
+    allow(buttons.record, station.cannot("station.record.start"));
+    text(buttons.record, this.#recording ? "End the recording" : "Record a drive");
+  }
+
+  // --- kept paths -----------------------------------------------------------------------------------------------
+
+  #connected() {
+    if (this.station.connected) this.#list();
+    else this.#recording = false;
+    this.show();
+  }
+
+  #forget() {
+    this.select.replaceChildren();
+    this.name.value = "";
+    text(this.told, "");
+    this.#recording = false;
+  }
+
+  async #list(chosen = this.select.value) {
+    const answer = await this.station.attempt(this.station.call("station.paths"), "Kept paths");
+    if (!answer) return;
+    const options = answer.paths.map(({ name, length_m }) => h("option", { value: name }, titled(name, length_m)));
+    this.select.replaceChildren(...options);
+    if (answer.paths.some(({ name }) => name === chosen)) this.select.value = chosen;
+    this.show();
+  }
+
+  async #load() {
+    const name = this.select.value;
+    const answer = await this.station.attempt(this.station.call("station.path.read", { name }), `Path ${name}`);
+    if (!answer) return;
+    this.name.value = name;
+    this.#take(answer.path, `${name} is in the editor.`);
+  }
+
+  #take(path, told) {
+    const lost = this.editor.load(path);
+    if (lost) this.station.say(`Path: ${lost}`, "warning", "look at it on the map before it is driven");
+    text(this.told, told);
+  }
+
+  async #save() {
+    const name = this.name.value;
+    const exists = [...this.select.options].some(({ value }) => value === name);
+    if (exists && !confirm(`Replace the path ${name}?`)) return;
+    const params = { name, path: this.editor.spec(), replace: exists };
+    if (!(await this.station.attempt(this.station.call("station.path.write", params), `Path ${name}`))) return;
+    text(this.told, `${name} is saved.`);
+    this.#list(name);
+  }
+
+  async #delete() {
+    const name = this.select.value;
+    if (!confirm(`Delete the path ${name}?`)) return;
+    if (!(await this.station.attempt(this.station.call("station.path.delete", { name }), `Path ${name}`))) return;
+    text(this.told, `${name} is deleted.`);
+    this.#list();
+  }
+
+  // --- files of this machine ------------------------------------------------------------------------------------
+
+  async #import() {
+    const [file] = this.file.files;
+    this.file.value = "";
+    if (!file) return;
+    const path = asPath(await file.text());
+    if (!path) {
+      const remedy = "give a path as JSON, such as Export writes it; YAML files go into the robot's folder of paths";
+      this.station.say(`${file.name} is no path`, "error", remedy);
+      return;
+    }
+    this.name.value = file.name.replace(/\.\w+$/, "").replace(/[^A-Za-z0-9_-]/g, "-");
+    this.#take(path, `${file.name} is in the editor.`);
+  }
+
+  /** JSON is YAML, too: `canhelm drive path` reads it. */
+  #export() {
+    const content = `${JSON.stringify(this.editor.spec(), null, 1)}\n`;
+    const href = URL.createObjectURL(new Blob([content], { type: "application/json" }));
+    h("a", { href, download: `${this.name.value || "path"}.json` }).click();
+    setTimeout(() => URL.revokeObjectURL(href), 1000);
+  }
+
+  // --- recording ------------------------------------------------------------------------------------------------
+
+  async #record() {
+    if (this.#recording) await this.#endRecording();
+    else if (await this.station.attempt(this.station.call("station.record.start"), "Recording")) {
+      this.#recording = true;
+      text(this.told, "Recording: drive the way, then end the recording.");
+    }
+    this.show();
+  }
+
+  async #endRecording() {
+    this.#recording = false;
+    const call = this.station.call("station.record.stop", { keep: false }, { timeout_ms: 60_000 });
+    const answer = await this.station.attempt(call, "Recording");
+    if (!answer) text(this.told, "Nothing was recorded.");
+    else this.#take(answer.path, `The recorded way is in the editor: ${answer.length_m.toFixed(2)} m, ${answer.pieces} pieces.`);
+  }
+}
+
+function titled(name, length_m) {
+  return length_m == null ? name : `${name} (${length_m.toFixed(1)} m)`;
+}
+
+/** The path in a text, or null where there is none. */
+function asPath(content) {
+  try {
+    const path = JSON.parse(content);
+    return Array.isArray(path?.pieces) && path.pieces.every((piece) => piece && typeof piece === "object") ? path : null;
+  } catch {
+    return null;
+  }
+}

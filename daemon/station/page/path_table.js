@@ -1,0 +1,81 @@
+/** The table of a path's pieces: every number of it, for the keyboard. */
+
+import { attribute, h } from "./dom.js";
+import { choice, field, put } from "./fields.js";
+import { Rows, table } from "./rows.js";
+
+const HEADS = ["Piece", "Shape", "Length [m]", "Radius [m]", "Turn [°], left positive", "Drive", "Remove"];
+const LENGTH = { min: 0.01, max: 10000, required: true };
+const TURN = { min: -3600, max: 3600, required: true };
+const SHAPES = { line: "line", arc: "arc" };
+const DRIVES = { forward: "forward", backward: "backward" };
+
+/** What a line becomes as an arc, and an arc as a line. */
+const AS = {
+  line: ({ length_m, radius_m, arc_deg }) => ({ length_m: length_m ?? arcLength(radius_m, arc_deg) }),
+  arc: ({ length_m }) => ({ radius_m: Math.max(length_m, 1), arc_deg: 45 }),
+};
+
+function arcLength(radius_m, arc_deg) {
+  return Number((radius_m * Math.abs(arc_deg) * Math.PI / 180).toFixed(3));
+}
+
+/** The table of an editor's pieces, kept as the editor changes. */
+export class PathTable {
+  #rows;
+
+  constructor(editor) {
+    this.editor = editor;
+    const { table: element, body } = table("Pieces of the path", HEADS);
+    this.element = h("div", { class: "scroll path-pieces" }, element);
+    this.#rows = new Rows(body, ({ index }) => this.#make(index), ({ index }) => index);
+  }
+
+  show() {
+    this.#rows.show(this.editor.entries.map((entry, index) => ({ index, entry })));
+  }
+
+  #make(index) {
+    const change = (numbers) => this.editor.change(index, numbers);
+    const cells = {
+      kind: choice(`Shape of piece ${index}`, SHAPES, (kind) => this.#reshape(index, kind)),
+      length_m: field(`Length of piece ${index} in metres`, LENGTH, (length_m) => change({ length_m })),
+      radius_m: field(`Radius of piece ${index} in metres`, LENGTH, (radius_m) => change({ radius_m })),
+      arc_deg: field(`Turn of piece ${index} in degrees`, TURN, (arc_deg) => arc_deg && change({ arc_deg })),
+      drive: choice(`Driving direction of piece ${index}`, DRIVES, (drive) => change({ backward: drive === "backward" })),
+    };
+    const remove = h("button", { type: "button", "aria-label": `Remove piece ${index}`, onclick: () => this.#remove(index) }, "✕");
+    const head = h("th", { scope: "row" }, String(index));
+    const columns = [...Object.values(cells), remove].map((cell) => h("td", {}, cell));
+    const element = h("tr", { onfocusin: () => this.editor.set("chosen", index) }, head, ...columns);
+    return { element, show: ({ entry }) => this.#show(element, cells, index, entry) };
+  }
+
+  #show(element, cells, index, entry) {
+    const { kind, length_m, radius_m, arc_deg, backward } = entry;
+    const isArc = kind === "arc";
+    attribute(element, "data-chosen", this.editor.chosen === index);
+    attribute(element, "data-wrong", this.editor.problem?.piece === index);
+    put(cells.kind, kind);
+    put(cells.drive, backward ? "backward" : "forward");
+    put(cells.length_m, isArc ? arcLength(radius_m, arc_deg) : length_m);
+    put(cells.radius_m, isArc ? radius_m : "");
+    put(cells.arc_deg, isArc ? arc_deg : "");
+    [cells.length_m.disabled, cells.radius_m.disabled, cells.arc_deg.disabled] = [isArc, !isArc, !isArc];
+  }
+
+  #reshape(index, kind) {
+    const { backward, ...before } = this.editor.entries[index];
+    if (kind === before.kind) return;
+    this.editor.edit((state) => {
+      state.entries[index] = { kind, ...AS[kind](before), backward };
+    });
+  }
+
+  /** Take a piece away; the focus goes to the one that comes in its place. */
+  #remove(index) {
+    this.editor.remove(index);
+    const buttons = this.element.querySelectorAll("tbody button");
+    buttons[Math.min(index, buttons.length - 1)]?.focus();
+  }
+}

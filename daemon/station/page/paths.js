@@ -1,0 +1,108 @@
+/** The panel of paths: draw, check, keep and drive them, and see the errors meanwhile. */
+
+import { ErrorCharts, SpeedChart } from "./charts.js";
+import { h, redraw } from "./dom.js";
+import { Following } from "./following.js";
+import { PathCheck } from "./path_check.js";
+import { editorOf } from "./path_editor.js";
+import { PathFiles } from "./path_files.js";
+import { StartFields } from "./path_start.js";
+import { PathTable } from "./path_table.js";
+import { VerdictText } from "./path_verdict.js";
+import { openNewestRun } from "./runs.js";
+
+const WRITING = "input, textarea, select";
+const HINT =
+  "On the map drag the square where the path begins, its knob, and the dots where pieces end; add lines and arcs by clicks. "
+  + "Alt switches the snap off, Ctrl-Z and Ctrl-Y undo and redo.";
+
+/** The panel. */
+export function create(station) {
+  return new PathsPanel(station).element;
+}
+
+class PathsPanel {
+  constructor(station) {
+    this.station = station;
+    this.editor = editorOf(station);
+    this.following = new Following(station, this.editor, () => this.check);
+    this.check = new PathCheck(station, this.editor, () => this.following.speed_m_s());
+    this.verdict = new VerdictText(this.check, (length_m) => this.following.lasts(length_m));
+    this.files = new PathFiles(station, this.editor);
+    this.table = new PathTable(this.editor);
+    this.start = new StartFields(this.editor);
+    this.errors = new ErrorCharts(station);
+    this.speeds = new SpeedChart(station);
+    this.#make();
+    this.#listen();
+    this.#show();
+  }
+
+  #make() {
+    this.lacking = h("p", { class: "reason", hidden: true }, "This vehicle follows no paths.");
+    this.body = h(
+      "div",
+      { class: "path-body" },
+      this.verdict.element,
+      this.following.element,
+      h("section", { "aria-labelledby": "errors-title" }, h("h3", { id: "errors-title" }, "Errors beside the path"), this.errors.element,
+        h("a", { href: "#runs", onclick: openNewestRun }, "Open the newest run with its picture")),
+      this.#editorPart(),
+      this.files.element,
+    );
+    const speeds = h("details", { ontoggle: () => this.speeds.chart.changed() }, h("summary", {}, "Speed of a drive"), this.speeds.element);
+    this.element = h("section", { "aria-labelledby": "paths-title" }, h("h2", { id: "paths-title" }, "Paths"), this.lacking, this.body, speeds);
+  }
+
+  #editorPart() {
+    const button = (title, act) => h("button", { type: "button", onclick: act }, title);
+    const { editor } = this;
+    this.undo = button("Undo", () => editor.undo());
+    this.redo = button("Redo", () => editor.redo());
+    this.clear = button("Clear", () => editor.clear());
+    this.snap = h("input", { type: "checkbox", onchange: () => editor.set("snaps", this.snap.checked) });
+    const adding = [button("Insert a line", () => editor.insert("line")), button("Insert an arc", () => editor.insert("arc"))];
+    return h(
+      "fieldset",
+      {},
+      h("legend", {}, "Pieces"),
+      this.start.element,
+      this.table.element,
+      h("div", { class: "row" }, ...adding, this.undo, this.redo, this.clear),
+      h("label", { class: "tick" }, this.snap, "Snap to 0.1 m and 5°"),
+      h("p", { class: "muted" }, HINT),
+    );
+  }
+
+  #listen() {
+    const { station } = this;
+    const show = redraw(this.element, () => this.#show());
+    this.editor.addEventListener("change", show);
+    this.check.addEventListener("change", show);
+    for (const kind of ["status", "connected", "shape", "stale"]) station.on(kind, show);
+    station.on("robot", () => this.following.forget());
+    document.addEventListener("keydown", (event) => this.#onKey(event));
+    new ResizeObserver(show).observe(this.element);
+  }
+
+  /** Undo and redo, where no text is being written. */
+  #onKey(event) {
+    if (!(event.ctrlKey || event.metaKey) || event.target.matches?.(WRITING)) return;
+    const key = event.key.toLowerCase();
+    if (key === "y" || (key === "z" && event.shiftKey)) this.editor.redo();
+    else if (key === "z") this.editor.undo();
+    else return;
+    event.preventDefault();
+  }
+
+  #show() {
+    const { editor, station } = this;
+    const lacks = Boolean(station.shape && !station.shape.path);
+    this.lacking.hidden = !lacks;
+    this.body.hidden = lacks;
+    [this.undo.disabled, this.redo.disabled] = [!editor.undoable, !editor.redoable];
+    this.clear.disabled = !editor.entries.length;
+    this.snap.checked = editor.snaps;
+    for (const part of [this.verdict, this.following, this.table, this.start, this.files]) part.show();
+  }
+}

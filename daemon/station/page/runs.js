@@ -1,0 +1,139 @@
+/** The panel of runs: what motions and faults have left, with pictures and downloads. */
+
+import { allow, attribute, h, number, text } from "./dom.js";
+import { Rows, table } from "./rows.js";
+
+const HEADS = ["Run", "Begun", "What", "How it ended", "Duration", "Files"];
+const WANTED = "run-wanted";
+
+/** Open the newest run in its panel, once that is shown. */
+export function openNewestRun() {
+  document.dispatchEvent(new Event(WANTED));
+}
+
+/** The panel. */
+export function create(station) {
+  return new RunsPanel(station).element;
+}
+
+class RunsPanel {
+  #rows;
+  #chosen = null;
+  #asked = 0;
+
+  constructor(station) {
+    this.station = station;
+    this.#make();
+    station.on("connected", () => station.connected && this.#seen() && this.reload());
+    station.on("robot", () => this.#forget());
+    station.on("connected", () => this.#show());
+    document.addEventListener(WANTED, () => this.#openNewest());
+    addEventListener("hashchange", () => location.hash === "#runs" && this.reload());
+    if (location.hash === "#runs") station.on("shape", () => this.#seen() && this.reload());
+  }
+
+  #make() {
+    this.button = h("button", { type: "button", onclick: () => this.reload() }, "Reload");
+    const { table: element, body } = table("Runs, the newest first", HEADS);
+    this.#rows = new Rows(body, (run) => this.#row(run), ({ run }) => run);
+    this.told = h("p", { class: "reason", role: "status" });
+    this.title = h("h3");
+    this.picture = h("img", { class: "run-picture", hidden: true, alt: "" });
+    this.picture.addEventListener("load", () => this.#drawn());
+    this.picture.addEventListener("error", () => this.#notDrawn());
+    this.drawing = h("p", { class: "reason", role: "status" });
+    const row = h("div", { class: "row" }, this.button);
+    const scroll = h("div", { class: "scroll runs-table", tabindex: 0, role: "region", "aria-label": "Table of runs" }, element);
+    const opened = h("section", { "aria-label": "Opened run" }, this.title, this.drawing, this.picture);
+    this.element = h("section", { "aria-labelledby": "runs-title" }, h("h2", { id: "runs-title" }, "Runs"), row, this.told, opened, scroll);
+  }
+
+  #seen() {
+    return !this.element.closest("[hidden]");
+  }
+
+  #show() {
+    allow(this.button, this.station.cannot("station.runs"));
+  }
+
+  #forget() {
+    this.#asked += 1;
+    this.#rows.show([]);
+    this.#close();
+    text(this.told, "");
+  }
+
+  /** Read the list of runs anew; returns them, the newest first. */
+  async reload() {
+    const asked = ++this.#asked;
+    const answer = await this.station.attempt(this.station.call("station.runs", {}, { timeout_ms: 15_000 }), "Runs");
+    if (!answer || asked !== this.#asked) return [];
+    const runs = [...answer.runs].sort((one, other) => String(other.begun).localeCompare(String(one.begun)));
+    this.#rows.show(runs);
+    text(this.told, runs.length ? `${runs.length} runs` : "No runs yet: every motion leaves one.");
+    return runs;
+  }
+
+  async #openNewest() {
+    const [newest] = await this.reload();
+    if (newest) this.#open(newest);
+  }
+
+  // --- one run --------------------------------------------------------------------------------------------------
+
+  #row(run) {
+    const open = h("button", { type: "button", "aria-label": `Open run ${run.run}`, onclick: () => this.#open(run) }, run.run);
+    const cells = { begun: h("td"), method: h("td"), ended: h("td"), duration: h("td", { class: "number" }), files: h("td") };
+    const element = h("tr", {}, h("th", { scope: "row" }, open), ...Object.values(cells));
+    return { element, show: (now) => this.#fill(element, cells, now) };
+  }
+
+  #fill(element, cells, { run, begun, method, ended, duration_s, files }) {
+    attribute(element, "data-chosen", run === this.#chosen);
+    text(cells.begun, begun);
+    text(cells.method, method);
+    text(cells.ended, ended ?? "under way");
+    text(cells.duration, duration_s == null ? "–" : `${number(duration_s, 1)} s`);
+    if (cells.files.childElementCount !== files.length) cells.files.replaceChildren(this.#links(run, files));
+  }
+
+  /** Downloads behind a name that can be opened: a run has half a dozen files. */
+  #links(run, files) {
+    const links = files.map((file) => h("li", {}, h("a", { href: this.#address(run, file), download: `${run}-${file}` }, file)));
+    return h("details", {}, h("summary", {}, `${files.length} files`), h("ul", { class: "run-files" }, ...links));
+  }
+
+  #address(run, file) {
+    return `runs/${[this.station.robot, run, file].map(encodeURIComponent).join("/")}`;
+  }
+
+  #open({ run, method }) {
+    this.#chosen = run;
+    text(this.title, `Run ${run}: ${method}`);
+    text(this.drawing, "Drawing its picture …");
+    this.picture.hidden = true;
+    attribute(this.picture, "alt", `Picture of run ${run}: way, speeds, errors and currents over time`);
+    attribute(this.picture, "src", this.#address(run, "plot"));
+  }
+
+  #drawn() {
+    this.picture.hidden = false;
+    text(this.drawing, "");
+  }
+
+  /** Ask for the reason, which an image does not tell. */
+  async #notDrawn() {
+    if (!this.#chosen) return;
+    const answer = await fetch(this.picture.src).then((response) => response.json()).catch(() => null);
+    const remedy = answer?.remedy ? ` – ${answer.remedy}` : "";
+    text(this.drawing, `No picture: ${answer?.message ?? "the station does not answer"}${remedy}`);
+  }
+
+  #close() {
+    this.#chosen = null;
+    this.picture.hidden = true;
+    attribute(this.picture, "src", null);
+    text(this.title, "");
+    text(this.drawing, "");
+  }
+}
