@@ -64,6 +64,15 @@ class Child:
                 raise AssertionError(self.log.read_text())
             select.select([], [], [], 0.02)
 
+    @contextmanager
+    def suspended(self) -> Iterator[None]:
+        """It does nothing while the ``with`` block lasts."""
+        self.process.send_signal(signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            self.process.send_signal(signal.SIGCONT)
+
     def kill(self) -> None:
         """End it at once, as a crash does."""
         self.process.kill()

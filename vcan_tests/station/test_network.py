@@ -1,0 +1,148 @@
+"""The network between page and station is lost in mid-drive, the station dies, the daemon dies: at rest, told, back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+
+from vcan_tests.station.browser import Operator
+from vcan_tests.station.conftest import Meet
+from vcan_tests.station.processes import Fleet, Robot, at_rest, speeds
+from vcan_tests.station.wire import Wire, wire_to
+
+pytestmark = pytest.mark.station
+
+LEASE_S = 1.5
+RAMP_S = 0.8
+"""From the speed that is driven here, by the ramp of a drive."""
+LOST = (r"WebSocket connection", r"^failed: ", r"console error: Failed to load resource", r"^50\d: ")
+"""What a browser itself tells of a connection that is lost."""
+
+
+@pytest.fixture
+def wire(fleet: Fleet) -> Iterator[Wire]:
+    """The network between the page and the station."""
+    with wire_to(fleet.station.port) as wire:
+        yield wire
+
+
+@pytest.fixture
+def driver(meet: Meet, wire: Wire, robot: Robot) -> Operator:
+    """Somebody who drives over that network, and holds the stick."""
+    operator = meet(wire.url)
+    operator.expects(*LOST)
+    operator.open(robot.name)
+    operator.go_to("drive")
+    operator.pulls(".stick", right=0.0, up=0.6)
+    robot.comes_to(lambda status: min(speeds(status)) > 0.1)
+    return operator
+
+
+@contextmanager
+def never_moves_again(robot: Robot) -> Iterator[None]:
+    """The robot stands, and is not in motion once while the ``with`` block lasts."""
+    robot.comes_to_rest(LEASE_S + RAMP_S)
+    motions = robot.status()["motions"]
+    yield
+    status = robot.status()
+    assert at_rest(status)
+    assert status["motions"] == motions == []
+
+
+def test_a_network_that_is_cut_stops_the_robot_and_the_page_comes_back_by_itself(
+    driver: Operator, wire: Wire, robot: Robot
+) -> None:
+    wire.cut()
+    with never_moves_again(robot):
+        driver.sees("#connection", "reconnecting")
+        wire.mend()
+        driver.sees("#connection", "^.?\\s?connected")
+        driver.sees("#notes", "connection to the robot is lost")
+        driver.page.wait_for_timeout(500.0)
+    driver.page.mouse.up()
+
+
+def test_a_network_that_is_frozen_stops_the_robot_and_the_page_says_that_its_values_are_old(
+    driver: Operator, wire: Wire, robot: Robot
+) -> None:
+    wire.freeze()
+    with never_moves_again(robot):
+        driver.sees("#connection", "stale|reconnecting")
+        assert driver.page.get_attribute("body", "data-stale") == "true"
+        wire.thaw()
+        driver.sees("#connection", "^.?\\s?connected")
+        assert driver.page.get_attribute("body", "data-stale") is None
+        driver.page.wait_for_timeout(500.0)
+    driver.page.mouse.up()
+
+
+def test_a_network_that_is_frozen_for_long_is_given_up_and_comes_back(
+    driver: Operator, wire: Wire, robot: Robot
+) -> None:
+    wire.freeze()
+    with never_moves_again(robot):
+        driver.sees("#connection", "reconnecting")
+        wire.thaw()
+        driver.sees("#connection", "^.?\\s?connected")
+        driver.page.wait_for_timeout(500.0)
+    driver.page.mouse.up()
+
+
+def test_after_the_network_is_back_the_robot_drives_when_the_stick_is_let_go_of_and_held_again(
+    driver: Operator, wire: Wire, robot: Robot
+) -> None:
+    wire.cut()
+    robot.comes_to_rest(LEASE_S + RAMP_S)
+    wire.mend()
+    driver.sees("#connection", "^.?\\s?connected")
+    driver.page.mouse.up()
+    driver.until(lambda: driver.page.get_attribute(".stick", "aria-disabled") is None, lambda: driver.text("#message"))
+    driver.pulls(".stick", right=0.0, up=0.6)
+    robot.comes_to(lambda status: min(speeds(status)) > 0.1)
+    driver.page.mouse.up()
+
+
+def test_a_stop_without_a_connection_is_said_not_to_have_been_sent(driver: Operator, wire: Wire, robot: Robot) -> None:
+    wire.cut()
+    driver.sees("#connection", "reconnecting")
+    driver.page.mouse.up()
+    driver.page.click("#stop")
+    driver.sees("#alarms", "NOT SENT")
+    wire.mend()
+    driver.sees("#connection", "^.?\\s?connected")
+
+
+def test_a_station_that_dies_leaves_the_robot_at_rest_and_the_page_finds_it_again(
+    driver: Operator, fleet: Fleet, robot: Robot
+) -> None:
+    fleet.station.kill()
+    with never_moves_again(robot):
+        driver.sees("#connection", "reconnecting")
+        fleet.station.begin_again()
+        driver.sees("#connection", "^.?\\s?connected")
+    driver.page.mouse.up()
+
+
+def test_a_daemon_that_dies_is_told_of_and_found_again(driver: Operator, robot: Robot) -> None:
+    robot.kill()
+    driver.sees("#connection", "reconnecting")
+    assert driver.page.get_attribute("body", "data-stale") == "true"
+    robot.begin_again()
+    robot.wait_until_ready()
+    driver.sees("#connection", "^.?\\s?connected")
+    driver.sees("#state", "idle")
+    driver.page.mouse.up()
+    assert at_rest(robot.status())
+
+
+def test_a_daemon_that_is_stopped_in_mid_air_makes_the_values_stale(
+    driver: Operator, robot: Robot, expected_errors: list[str]
+) -> None:
+    driver.page.mouse.up()
+    robot.comes_to_rest(LEASE_S + RAMP_S)
+    with robot.suspended():
+        driver.sees("#connection", "stale|reconnecting")
+        driver.sees("#stale", "old")
+    driver.sees("#connection", "^.?\\s?connected")
