@@ -31,6 +31,15 @@ SIMULATION_METHODS = (
         "node, angle_deg",
     ),
     Method(
+        "simulation.slope",
+        "Tilt the floor under the simulated robot; 0 makes it level again.",
+        (
+            Param("slope_deg", "number", "against the level", "deg", minimum=0.0, maximum=20.0),
+            Param("direction_deg", "number", "that leads down, in the frame of true poses", "deg", 0.0, -360.0, 360.0),
+        ),
+        "slope_deg, direction_deg",
+    ),
+    Method(
         "simulation.lift",
         "Put the simulated robot onto blocks, its wheels in the air, or down again.",
         (Param("lifted", "boolean", "onto blocks"),),
@@ -49,7 +58,7 @@ SIMULATION_METHODS = (
         "simulation.look",
         "What can be seen of the simulated robot.",
         (),
-        "lifted, wheel_deg, heading_deg, brakes_engaged",
+        "stands, lifted, floor (its slope), wheel_deg, heading_deg, brakes_engaged",
         Role.WATCH,
     ),
     Method(

@@ -41,6 +41,21 @@ def turn(node: Node, angle: float | None = None, /, *, options: Options = DEFAUL
 
 
 @app.command
+def slope(degrees: float, /, *, direction: float = 0.0, options: Options = DEFAULT) -> None:
+    """Tilt the floor under the simulated robot, up to 20 degrees; 0 makes it level again.
+
+    Example: `canhelm sim slope 5 --direction 180`
+
+    Args:
+        degrees: Against the level.
+        direction: Degrees from where the robot pointed at the beginning, counter-clockwise, to where it leads down.
+    """
+    with options.client() as client:
+        told = client.call("simulation.slope", slope_deg=degrees, direction_deg=direction)
+    show(told, json=options.json)
+
+
+@app.command
 def lift(state: Literal["on", "off"], /, *, options: Options = DEFAULT) -> None:
     """Put the simulated robot onto blocks, its wheels in the air, or down again.
 

@@ -113,7 +113,7 @@ def _told(piece: Piece) -> dict[str, Any]:
 
 
 def _lead_m(geometry: object) -> float:
-    """From the reference point for driving backward ahead to the one for driving forward, the vehicle being straight."""
+    """From the reference point for driving backward ahead to the one for driving forward, the vehicle straight [m]."""
     if not isinstance(geometry, SemitrailerGeometry):
         return 0.0
     return round(geometry.hitch_offset_m + geometry.trailer.length_m, 6)

@@ -25,6 +25,13 @@ class Network(Protocol):
     def turn_sensor(self, node: int, angle_rad: float | None) -> None:
         """Hold the axis of an encoder by hand at an angle; None lets go of it."""
 
+    @property
+    def stands_on_floor(self) -> bool:
+        """Whether its wheels touch a floor."""
+
+    def tilt(self, slope_rad: float, downhill_rad: float) -> None:
+        """Tilt the floor."""
+
 
 class SimulationCommands:
     """Handlers of the ``simulation.*`` methods, by name in :attr:`handlers`.
@@ -41,6 +48,7 @@ class SimulationCommands:
             "simulation.power": self._power,
             "simulation.input": self._input,
             "simulation.turn": self._turn,
+            "simulation.slope": self._slope,
         }
 
     async def _power(self, params: Params, lease: str | None) -> dict[str, Any]:
@@ -71,6 +79,15 @@ class SimulationCommands:
             raise NodeAbsent(f"node {node} is no encoder", node=node, remedy="name an encoder")
         network.turn_sensor(node, None if angle is None else math.radians(angle))
         return {"node": params["node"], "angle_deg": angle}
+
+    async def _slope(self, params: Params, lease: str | None) -> dict[str, Any]:
+        network = self._simulated("its floor is as it is")
+        if not network.stands_on_floor:
+            raise Refused("this simulated robot stands on no floor: its wheels turn in the air",
+                          remedy="tilt the floor of a vehicle with a mass in its profile")  # fmt: skip
+        slope_deg, direction_deg = float(params["slope_deg"]), float(params["direction_deg"])
+        network.tilt(math.radians(slope_deg), math.radians(direction_deg))
+        return {"slope_deg": slope_deg, "direction_deg": direction_deg}
 
     def _simulated(self, why_not: str) -> Network:
         if self._network is None:

@@ -1,5 +1,7 @@
 """An accelerometer somewhere on the robot: it reads the change of its own velocity, along its own axes.
 
+What pulls at everything alike, gravity on a slope, it does not feel: that is taken off.
+
 Nothing is known here of centripetal and Euler terms: the velocity of the sensor's place on the floor is differenced
 from step to step, which has them in it. A first-order filter stands for the sensor's bandwidth.
 """
@@ -39,7 +41,9 @@ class SimulatedAccelerometer:
         self._random = Random(seed)
         self._last_vx = self._last_vy = 0.0
 
-    def follow(self, vx: float, vy: float, yaw_rate: float, c: float, s: float, dt_s: float) -> None:
+    def follow(
+        self, vx: float, vy: float, yaw_rate: float, c: float, s: float, dt_s: float, pull: tuple[float, float]
+    ) -> None:
         """Take over the robot's motion after one step.
 
         Args:
@@ -47,21 +51,25 @@ class SimulatedAccelerometer:
             yaw_rate: of the robot.
             c, s: cosine and sine of its yaw angle.
             dt_s: length of the step.
+            pull: acceleration by gravity along the floor.
         """
         x, y = self._x_m * c - self._y_m * s, self._x_m * s + self._y_m * c
         vx, vy = vx - yaw_rate * y, vy + yaw_rate * x
-        ax, ay = (vx - self._last_vx) / dt_s, (vy - self._last_vy) / dt_s
+        ax, ay = (vx - self._last_vx) / dt_s - pull[0], (vy - self._last_vy) / dt_s - pull[1]
         self._last_vx, self._last_vy = vx, vy
-        ahead, left = ax * c + ay * s, ay * c - ax * s
-        along_x, along_y = ahead * self._cos + left * self._sin, left * self._cos - ahead * self._sin
+        along_x, along_y = self._along_axes(ax, ay, c, s)
         share = dt_s / (BANDWIDTH_S + dt_s)
         old_x, old_y = self.acceleration_m_s2
         self.acceleration_m_s2 = (old_x + share * (along_x - old_x), old_y + share * (along_y - old_y))
 
-    def rest(self) -> None:
-        """The robot has come to rest."""
+    def rest(self, c: float, s: float, pull: tuple[float, float]) -> None:
+        """The robot has come to rest; arguments as of :meth:`follow`."""
         self._last_vx = self._last_vy = 0.0
-        self.acceleration_m_s2 = (0.0, 0.0)
+        self.acceleration_m_s2 = self._along_axes(-pull[0], -pull[1], c, s)
+
+    def _along_axes(self, ax: float, ay: float, c: float, s: float) -> tuple[float, float]:
+        ahead, left = ax * c + ay * s, ay * c - ax * s
+        return ahead * self._cos + left * self._sin, left * self._cos - ahead * self._sin
 
     def voltage_mv(self, axis: int) -> float:
         """Voltage of axis 0 (x) or 1 (y), with noise."""

@@ -1,4 +1,8 @@
-"""What the simulated robots have in common: a rigid body on a level floor, integrated in fixed steps, and its rest."""
+"""What the simulated robots have in common: a rigid body on a floor, integrated in fixed steps, and its rest.
+
+On a floor that is tilted by the angle a, g sin a pulls at every mass, down the slope. Poses are those on the floor; the
+wheel loads are those of a level one, too large by the share 1 - cos a, 3.4 % at 15 degrees.
+"""
 
 from __future__ import annotations
 
@@ -74,6 +78,7 @@ class BodyWorld(ABC):
     Attributes:
         lifted: whether it stands on blocks, its wheels in the air; only they move then.
         hands: how far hands still turn wheels that are in the air and without current [rad], by their drives.
+        slope_rad, downhill_rad: of the floor against the level, and the direction that leads down.
         contacts: where driven wheels touch the floor, by the names of their drives.
     """
 
@@ -90,6 +95,8 @@ class BodyWorld(ABC):
         self._x_m, self._y_m, self._yaw_rad = start
         self._cos, self._sin = cos(self._yaw_rad), sin(self._yaw_rad)
         self._world_vx = self._world_vy = self._yaw_rate = 0.0
+        self.slope_rad = self.downhill_rad = 0.0
+        self._pull_x = self._pull_y = 0.0
         self._step_s = step_s
         self._origin_s: float | None = None
         self._advanced_s: float | None = None
@@ -174,6 +181,18 @@ class BodyWorld(ABC):
                 return
             self._steps_done += 1
 
+    def tilt(self, slope_rad: float, downhill_rad: float) -> None:
+        """Tilt the floor from the last advanced time on.
+
+        Args:
+            slope_rad: against the level.
+            downhill_rad: direction on the floor that leads down, counter-clockwise from the x axis of the poses.
+        """
+        self.slope_rad, self.downhill_rad = slope_rad, downhill_rad
+        pull = GRAVITY_M_S2 * sin(slope_rad)
+        self._pull_x, self._pull_y = pull * cos(downhill_rad), pull * sin(downhill_rad)
+        self._quiet_steps = 0
+
     def block(self, drive: str, blocked: bool) -> None:
         """Let something jam a motor from the last advanced time on, or take it away."""
         self._drives[list(self.axes).index(drive)].block(blocked)
@@ -213,12 +232,12 @@ class BodyWorld(ABC):
         return changed
 
     def _move(self, force_x: float, force_y: float, yaw_acceleration: float, dt: float) -> None:
-        """Move the body for one step by a force in its own frame."""
+        """Move the body for one step by the floor's force in its own frame, and by the pull of a slope."""
         self._yaw_rate += yaw_acceleration * dt
         c, s = self._cos, self._sin
         per_mass = dt / self._mass_kg
-        self._world_vx += (force_x * c - force_y * s) * per_mass
-        self._world_vy += (force_x * s + force_y * c) * per_mass
+        self._world_vx += (force_x * c - force_y * s) * per_mass + self._pull_x * dt
+        self._world_vy += (force_x * s + force_y * c) * per_mass + self._pull_y * dt
         self._x_m += self._world_vx * dt
         self._y_m += self._world_vy * dt
         if self._yaw_rate != 0.0:

@@ -201,6 +201,17 @@ class SimulatedNetwork:
         assert isinstance(encoder, SimulatedEncoder)
         encoder.sensor.held_rad = angle_rad
 
+    @property
+    def stands_on_floor(self) -> bool:
+        """Whether its wheels touch a floor; a stand's turn in the air."""
+        return not isinstance(self.world, StandWorld)
+
+    def tilt(self, slope_rad: float, downhill_rad: float) -> None:
+        """Tilt the floor under the robot from now on, as :meth:`BodyWorld.tilt`."""
+        self.world.advance(asyncio.get_running_loop().time())
+        self.world.tilt(slope_rad, downhill_rad)
+        self._wake()
+
     def _bricks(self, which: int | str) -> list[SimulatedBrick]:
         return [brick for name, brick in self.bricks.items() if which in ("all", name)]
 

@@ -120,7 +120,8 @@ class OmniWorld(BodyWorld):
         self._move(force_x, force_y, moment / self._yaw_inertia, dt)
         self._shift_loads(force_x, force_y, dt)
         if self.accelerometer is not None:
-            self.accelerometer.follow(self._world_vx, self._world_vy, self._yaw_rate, self._cos, self._sin, dt)
+            pull = (self._pull_x, self._pull_y)
+            self.accelerometer.follow(self._world_vx, self._world_vy, self._yaw_rate, self._cos, self._sin, dt, pull)
 
     def _shift_loads(self, force_x: float, force_y: float, dt: float) -> None:
         """Let the wheel loads follow the body's acceleration; a wheel does not pull at the floor."""
@@ -133,7 +134,7 @@ class OmniWorld(BodyWorld):
     def _come_to_rest(self) -> None:
         super()._come_to_rest()
         if self.accelerometer is not None:
-            self.accelerometer.rest()
+            self.accelerometer.rest(self._cos, self._sin, (self._pull_x, self._pull_y))
 
 
 def _smallest(rows: list[tuple[float, float, float]]) -> list[tuple[float, float, float]]:

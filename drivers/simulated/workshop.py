@@ -88,6 +88,10 @@ class Workshop:
         return {
             "stands": {"x_m": round(x_m, 3), "y_m": round(y_m, 3), "yaw_deg": round(degrees(yaw_rad), 2)},
             "lifted": world.lifted,
+            "floor": {
+                "slope_deg": round(degrees(world.slope_rad), 2),
+                "direction_deg": round(degrees(world.downhill_rad), 2),
+            },
             "wheel_deg": {name: round(degrees(world.wheel_rad(name)), 2) for name in world.axes},
             "heading_deg": {name: round(degrees(world.heading_rad(name)), 2) for name in self._headings},
             "brakes_engaged": {name: brake.engaged for name, brake in self._network.brakes.items()},
