@@ -54,6 +54,7 @@ TYPED = (
     ("sim power 3 off", 1, ""),
     ("sim input 3 1 low", 1, ""),
     ("sim turn front 5", 1, ""),
+    ("sim slope 5", 1, ""),
     ("sim lift on", 1, ""),
     ("sim hand front_left 10", 1, ""),
     ("sim look", 1, ""),
