@@ -51,8 +51,8 @@ class Section {
 
   constructor(name, caption) {
     this.name = name;
-    const { table: element, body } = table(caption, ["What", "Value", "How it is"]);
-    this.element = h("div", { class: "scroll", hidden: true }, element);
+    const { table: element, body } = table(caption, ["What", "Value"]);
+    this.element = h("div", { class: "scroll counters", hidden: true }, element);
     this.#rows = new Rows(body, makeRow, (item) => item.key);
   }
 
@@ -75,18 +75,20 @@ function itemOf(key, value, plain) {
 }
 
 function makeRow({ label }) {
-  const value = h("td");
+  const value = h("span");
   const how = badge();
+  const cell = h("td", {}, value, how);
   let before = null;
   let grown_ms = -Infinity;
   const show = (item) => {
     text(value, item.words);
+    cell.classList.toggle("words", item.words.length > 20);
     how.hidden = !item.counts;
     if (before !== null && item.value > before) grown_ms = performance.now();
     before = item.value;
     setBadge(how, ...judged(item.value, performance.now() - grown_ms < GROWING_MS));
   };
-  return { element: h("tr", {}, h("th", { scope: "row" }, label), value, h("td", {}, how)), show };
+  return { element: h("tr", {}, h("th", { scope: "row" }, label), cell), show };
 }
 
 /** How a counter of trouble is: kind of badge and word. */
@@ -111,7 +113,7 @@ export class BusTables {
   constructor() {
     const load = h("p", { class: "load" }, "Bus load ", this.#words, this.#load.element);
     const tables = h("div", { class: "cards" }, this.#sections.map((section) => section.element));
-    this.element = h("div", {}, load, this.#alarm, tables);
+    this.element = h("div", { class: "network" }, load, this.#alarm, tables);
   }
 
   show(status) {

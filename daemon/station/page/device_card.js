@@ -54,7 +54,7 @@ function trouble() {
     const absent = node.node_state !== "ready" ? { message: node.status } : null;
     const told = fault ?? absent;
     element.hidden = !told;
-    text(what, told?.code ? `${told.code}: ${told.message}` : told?.message);
+    text(what, told?.message);
     text(remedy, told?.remedy ? `What to do: ${told.remedy}` : "");
   };
   return { element, show };
@@ -86,7 +86,7 @@ export class DriveCard {
     this.disable = this.#button("Disable", "motor.disable");
     this.reset = this.#button("Reset fault", "motor.reset");
     this.jog = new Jog(station, node.name);
-    const commands = h("div", { class: "commands" }, this.enable, this.disable, this.reset);
+    const commands = h("div", { class: "row" }, this.enable, this.disable, this.reset);
     const parts = [this.head.element, this.#trouble.element, this.#facts.element, this.#statusword.element];
     this.element = h("article", { class: "card", "aria-label": `Drive ${node.name}` }, parts, commands,
       this.jog.element, this.#why);
@@ -99,7 +99,8 @@ export class DriveCard {
     this.#facts.show({
       Mode: node.mode,
       Velocity: `${number(node.velocity_rpm, 0)} rpm`,
-      Speed: `${number(node.speed_m_s, 3)} m/s of ${number(node.target_speed_m_s, 3)} m/s asked`,
+      Speed: `${number(node.speed_m_s, 3)} m/s`,
+      Target: `${number(node.target_speed_m_s, 3)} m/s`,
       Position: `${number(node.position_m, 3)} m`,
       Tacho: node.tacho_deg == null ? null : `${number(node.tacho_deg, 0)}°`,
       Current: this.#currentOf(node),
@@ -113,7 +114,7 @@ export class DriveCard {
     if (!this.#asked && node.node_state === "ready") this.#askLimit();
     const told = `${number(node.current_a, 2)} A`;
     if (this.#limit_a == null) return told;
-    const words = `${told} of ${number(this.#limit_a, 2)} A for ever`;
+    const words = `${told} of ${number(this.#limit_a, 2)} A continuous`;
     this.#bar.show(node.current_a, this.#limit_a, words);
     if (!this.#current.firstChild) this.#current.append(h("span"), this.#bar.element);
     text(this.#current.firstChild, words);

@@ -22,7 +22,7 @@ export class Jog {
   constructor(station, drive) {
     this.#station = station;
     this.#drive = drive;
-    this.#input = h("input", { type: "number", min: 1, max: 100000, step: 10, value: FIRST_RPM, inputmode: "numeric" });
+    this.#input = h("input", { type: "number", min: 1, max: 100000, step: 1, value: FIRST_RPM, inputmode: "numeric" });
     this.#buttons = [this.#button("◀ Back", -1), this.#button("Forward ▶", 1)];
     const speed = h("label", {}, "Jog at ", this.#input, " rpm");
     this.element = h("div", { class: "jog", role: "group", "aria-label": `Jog ${drive}` }, speed, this.#buttons);
