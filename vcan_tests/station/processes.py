@@ -9,6 +9,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 import urllib.request
 from collections.abc import Callable, Iterator, Sequence
@@ -144,6 +145,17 @@ class Robot(Child):
         """Watch until every wheel stands."""
         self.comes_to(at_rest, within_s)
 
+    @contextmanager
+    def watched(self) -> Iterator[SpeedWatch]:
+        """A look at its speed all the time while the ``with`` block lasts."""
+        watch = SpeedWatch(self.socket)
+        watch.start()
+        try:
+            yield watch
+        finally:
+            watch.over.set()
+            watch.join()
+
     def errors_since(self, begin: int) -> list[str]:
         """What its log tells of errors behind a place in it."""
         return ERROR.findall(self.log.read_text()[begin:])
@@ -156,6 +168,30 @@ class Robot(Child):
             if client.call("status")["state"] in ("estop", "fault"):
                 client.call("reset")
         self.comes_to(lambda status: status["state"] == "idle")
+
+
+class SpeedWatch(threading.Thread):
+    """Watches how fast a robot is, in a thread of its own.
+
+    Attributes:
+        speed_m_s: of the fastest wheel up to now.
+        over: set when it is to end.
+    """
+
+    def __init__(self, socket: Path) -> None:
+        super().__init__()
+        self.speed_m_s = 0.0
+        self.over = threading.Event()
+        self._socket = socket
+
+    def run(self) -> None:
+        """Look 50 times a second."""
+        with Client(self._socket) as client:
+            for method, status in client.notifications(rate_hz=50.0):
+                if method == "status":
+                    self.speed_m_s = max(self.speed_m_s, *speeds(status))
+                if self.over.is_set():
+                    return
 
 
 class Station(Child):

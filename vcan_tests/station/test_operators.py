@@ -54,7 +54,7 @@ def test_a_takeover_stops_the_first_and_both_see_it(first: Operator, second: Ope
     robot.comes_to_rest(1.5)
     second.sees("#holder", "you have the robot")
     first.sees("#holder", r"(?<!you) has the robot")
-    first.sees("#notes", "taken the robot over")
+    first.sees("#notes", "has the robot|taken the robot over")
     first.page.mouse.up()
     second.go_to("drive")
     second.pulls(".stick", right=0.0, up=0.6)

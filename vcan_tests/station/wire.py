@@ -84,12 +84,18 @@ class Wire:
         if not self._open:
             writer.transport.abort()
             return
+        with contextlib.suppress(OSError, asyncio.CancelledError):  # the station is away, or the test is over
+            await self._join(reader, writer)
+        writer.transport.abort()
+
+    async def _join(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         behind, ahead = await asyncio.open_connection("127.0.0.1", self._target)
         ends = {writer, ahead}
         self._writers |= ends
         try:
             await asyncio.gather(self._carry(reader, ahead, "up"), self._carry(behind, writer, "down"))
         finally:
+            ahead.transport.abort()
             self._writers -= ends
 
     async def _carry(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, way: Way) -> None:
