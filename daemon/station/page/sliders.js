@@ -5,12 +5,12 @@ import { allow, h, number, text } from "./dom.js";
 const LABELS = { speed: "Speed", direction: "Direction", yaw_rate: "Yaw rate", steering: "Steering" };
 const LACKS = {
   speed: "this vehicle is not driven by hand",
-  direction: "its wheels all turn with the vehicle: it cannot drive aside",
-  yaw_rate: "it turns by its steering, not by a rate",
-  steering: "it has no steered wheels",
+  direction: "this vehicle cannot drive sideways",
+  yaw_rate: "this vehicle turns by its steering",
+  steering: "this vehicle has no steered wheels",
 };
 const DIGITS = { "m/s": 2, deg: 0, "deg/s": 0 };
-const STEPS = { "m/s": 0.01, deg: 1, "deg/s": 1 };
+const STEPS = { "m/s": 0.005, deg: 0.5, "deg/s": 0.5 };
 /** Share of the vehicle's own limit that a person begins with. */
 const FIRST_SHARE = 0.5;
 
@@ -21,11 +21,11 @@ class Slider {
   constructor(name, label, lack) {
     this.#lack = lack;
     this.shown = h("output", { for: `slider-${name}` });
-    this.input = h("input", { type: "range", id: `slider-${name}`, min: -1, max: 1, step: 0.01, value: 0 });
+    this.input = h("input", { type: "range", id: `slider-${name}`, min: -1, max: 1, step: "any", value: 0 });
     this.why = h("span", { class: "reason", id: `why-${name}` });
     this.input.setAttribute("aria-describedby", this.why.id);
-    const words = h("span", { class: "name" }, h("label", { for: this.input.id }, label), this.shown);
-    this.element = h("div", { class: "slider" }, words, this.input, this.why);
+    const named = h("label", { for: this.input.id }, label);
+    this.element = h("div", { class: "slider" }, named, this.input, this.shown, this.why);
     this.input.addEventListener("input", () => this.show());
   }
 
@@ -33,13 +33,16 @@ class Slider {
   use(range, value = 0) {
     this.#range = range;
     if (range) {
-      Object.assign(this.input, { min: range.least, max: range.full, step: STEPS[range.unit], value });
+      Object.assign(this.input, { min: range.least, max: range.full });
+      this.input.value = value;
     }
     this.show();
   }
 
+  /** In whole steps, so that the middle is nothing and not nearly nothing. */
   get value() {
-    return this.input.valueAsNumber;
+    const step = STEPS[this.#range?.unit] ?? 1;
+    return Math.round(this.input.valueAsNumber / step) * step;
   }
 
   put(value) {
@@ -63,7 +66,7 @@ class Slider {
 
 export class Sliders {
   #sliders = Object.fromEntries(Object.entries(LABELS).map(([name, label]) => [name, new Slider(name, label, LACKS[name])]));
-  #fastest = new Slider("fastest", "My highest speed", LACKS.speed);
+  #fastest = new Slider("fastest", "Top speed", LACKS.speed);
   #ranges = {};
   #held = false;
   #onHold;

@@ -41,7 +41,8 @@ export class Stopper {
     const late = setTimeout(() => this.#tellLate(what), ANSWER_MS);
     try {
       const told = await answer;
-      station.say(`${what}: ${told.message || `stopped, the robot is ${told.state}`}`, "warning");
+      const done = told.message || `the robot is ${told.state}`;
+      station.say(method === "stop" ? `stopped: ${done}` : done, "warning");
     } catch (error) {
       station.say(`${what} not confirmed: ${error.message}`, "error", "look at the robot; stop it there if it moves");
     } finally {
