@@ -32,6 +32,8 @@ const PLAIN = {
   api: { pid: ["Process of the daemon"], clients: ["Clients"], requests: ["Requests"] },
 };
 const FACT = /^(planned_|speed_limit_|silent_line_)/;
+/** Name of the interface of a robot without a CAN bus. */
+const NO_BUS = "none";
 /** Time for which a counter that has grown is said to be growing. */
 const GROWING_MS = 3000;
 
@@ -100,8 +102,9 @@ function judged(value, growing) {
 
 /** Bus, cycle, recording and API in one element; `show` takes the status. */
 export class BusTables {
-  #load = new Bar("Bus load");
+  #bar = new Bar("Bus load");
   #words = h("span");
+  #load = h("p", {}, "Bus load ", this.#words, this.#bar.element);
   #alarm = h("p", { class: "trouble", hidden: true });
   #sections = [
     new Section("bus", "Bus"),
@@ -111,19 +114,24 @@ export class BusTables {
   ];
 
   constructor() {
-    const load = h("p", { class: "load" }, "Bus load ", this.#words, this.#load.element);
     const tables = h("div", { class: "cards" }, this.#sections.map((section) => section.element));
-    this.element = h("div", { class: "network" }, load, this.#alarm, tables);
+    this.element = h("div", { class: "network" }, this.#load, this.#alarm, tables);
   }
 
   show(status) {
-    const load = status.bus?.load ?? 0;
-    text(this.#words, percent(load));
-    this.#load.show(load, 1, percent(load));
+    const bus = status.bus?.name === NO_BUS ? null : status.bus;
+    this.#showLoad(bus);
     const { failing, path, lost } = status.recording ?? {};
     this.#alarm.hidden = !failing;
     const remedy = "make room on its disk: recording goes on by itself";
     text(this.#alarm, failing ? `The log ${path} cannot be written, ${lost} frames are lost: ${remedy}` : "");
-    for (const section of this.#sections) section.show(status[section.name]);
+    for (const section of this.#sections) section.show(section.name === "bus" ? bus : status[section.name]);
+  }
+
+  #showLoad(bus) {
+    this.#load.hidden = !bus;
+    if (!bus) return;
+    text(this.#words, percent(bus.load));
+    this.#bar.show(bus.load, 1, percent(bus.load));
   }
 }

@@ -14,7 +14,7 @@ const DRIVE_STATES = {
   unknown: ["warn", "unknown"],
 };
 const NODE_STATES = {
-  ready: ["good", "ready: configured and guarded"],
+  ready: ["good", "ready"],
   configuring: ["warn", "being configured"],
   refused: ["bad", "refused: differs from the profile"],
   absent: ["bad", "lost: not heard"],

@@ -50,7 +50,8 @@ function makeNode(node) {
   const state = badge();
   const cells = [h("td", {}, node.name), h("td", {}, node.device), h("td", {}, state)];
   const element = h("tr", {}, h("th", { scope: "row" }, node.node), cells);
-  return { element, show: (now) => setBadge(state, ...nodeState(now.node_state)) };
+  const show = ({ node_state }) => setBadge(state, ...(node_state === "ready" ? ["good", "guarded"] : nodeState(node_state)));
+  return { element, show };
 }
 
 /** What a first look at a bus without a profile has found. */

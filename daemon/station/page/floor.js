@@ -84,6 +84,7 @@ export class Ice {
   show(drives, faults) {
     const icy = new Map(faults.filter(({ kind, state }) => kind === "ice" && state !== "over").map((ice) => [ice.part, ice]));
     this.#wheels = wheelsOf(this.#station.shape, drives).map((name) => ({ name, ice: icy.get(name) ?? null }));
+    this.element.hidden = !this.#wheels.length;
     this.#rows.show(this.#wheels);
     const reason = this.#station.cannot("simulation.fault");
     for (const control of [this.#friction, this.#all, this.#none]) allow(control, reason);

@@ -25,7 +25,8 @@ export class Jog {
     this.#input = h("input", { type: "number", min: 1, max: 100000, step: 1, value: FIRST_RPM, inputmode: "numeric" });
     this.#buttons = [this.#button("◀ Back", -1), this.#button("Forward ▶", 1)];
     const speed = h("label", {}, "Jog at ", this.#input, " rpm");
-    this.element = h("div", { class: "jog", role: "group", "aria-label": `Jog ${drive}` }, speed, this.#buttons);
+    this.element = h("div", { class: "jog", role: "group", "aria-label": `Jog ${drive}` }, speed,
+      h("div", { class: "row" }, this.#buttons));
   }
 
   /** Let it be used, or not, with the reason. */

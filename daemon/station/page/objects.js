@@ -1,6 +1,6 @@
 /** The object browser: the objects of a node, read, and written by whoever may. */
 
-import { allow, h, text } from "./dom.js";
+import { allow, attribute, h, text } from "./dom.js";
 import { ObjectDetails } from "./object_details.js";
 import { Rows, table } from "./rows.js";
 
@@ -12,6 +12,7 @@ class ObjectsPanel {
   #device = null;
   #details;
   #rows;
+  #table;
   #node = h("select", { onchange: () => this.#chooseNode() });
   #search = h("input", { type: "search", placeholder: "name, 0x6041, current …", oninput: () => this.#list() });
   #told = h("p", { class: "aside", role: "status" });
@@ -24,12 +25,12 @@ class ObjectsPanel {
     const { table: element, body } = table("Objects of this node", ["Object", "Name", "Access", "Unit"]);
     this.#rows = new Rows(body, (entry) => this.#row(entry), (entry) => entry.object);
     const tools = h("div", { class: "row" }, h("label", {}, "Node ", this.#node), h("label", {}, "Search ", this.#search));
-    const list = h("div", { class: "scroll objects-list" }, element);
-    this.element = h("section", { class: "objects" }, h("h2", {}, "Objects"), tools, this.#told, list,
+    this.#table = h("div", { class: "scroll objects-list" }, element);
+    this.element = h("section", { class: "objects" }, h("h2", {}, "Objects"), tools, this.#told, this.#table,
       this.#details.element);
     station.on("status", () => this.#look());
     station.on("robot", () => this.#forget());
-    station.on("connected", () => this.#details.look());
+    station.on("connected", () => this.#onConnection());
   }
 
   #look() {
@@ -42,6 +43,12 @@ class ObjectsPanel {
     allow(this.#node, nodes.length ? null : "this robot has no CANopen nodes");
     if (!this.#wasVisible || this.#deviceOf() !== this.#device) this.#chooseNode();
     this.#wasVisible = true;
+    this.#details.look();
+  }
+
+  /** What was asked for in vain is asked for again. */
+  #onConnection() {
+    if (!this.#objects.length) this.#device = null;
     this.#details.look();
   }
 
@@ -76,6 +83,7 @@ class ObjectsPanel {
   #list() {
     const wanted = this.#search.value.trim().toLowerCase();
     const found = this.#objects.filter((entry) => textOf(entry).includes(wanted));
+    this.#table.hidden = !found.length;
     this.#rows.show(found);
     text(this.#told, this.#objects.length ? `${found.length} of ${this.#objects.length} objects` : this.#whyNone());
   }
@@ -87,10 +95,14 @@ class ObjectsPanel {
   }
 
   #row(entry) {
-    const choose = () => this.#details.choose(this.#node.value, entry);
+    const choose = () => {
+      this.#details.choose(this.#node.value, entry);
+      this.#list();
+    };
     const button = h("button", { type: "button", class: "link", onclick: choose }, entry.object);
     const cells = [entry.name.replaceAll("_", " "), ACCESS[entry.access], entry.unit].map((cell) => h("td", {}, cell));
-    return { element: h("tr", {}, h("th", { scope: "row" }, button), cells), show: () => {} };
+    const show = () => attribute(button, "aria-current", entry === this.#details.entry ? "true" : null);
+    return { element: h("tr", {}, h("th", { scope: "row" }, button), cells), show };
   }
 }
 
