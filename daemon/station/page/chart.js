@@ -10,7 +10,9 @@ const GAP_S = 0.5;
 const TICK_S = 10;
 const MARGIN = { left: 46, right: 8, top: 8, bottom: 20 };
 const ROWS = 4;
-const LIMIT_SHARE = 1.15;
+const SPARE = 1.1;
+/** Share of a limit from which on the axis reaches to it. */
+const NEAR_LIMIT = 0.25;
 const DASHES = [[], [6, 4], [2, 3], [8, 3, 2, 3]];
 
 /** Times and values of the last minute, in memory that does not grow. */
@@ -87,9 +89,10 @@ export class Chart {
   }
 
   #tell(values) {
-    const told = this.names.map((name, index) => `${name && `${name} `}${number(values[index], this.digits)} ${this.unit}`);
-    const limit = this.#limit === null ? "" : `, limit ${number(this.#limit, this.digits)} ${this.unit}`;
-    text(this.newest, told.join(", ") + limit);
+    const withUnit = (value) => `${number(value, this.digits)} ${this.unit}`;
+    const told = this.names.map((name, index) => `${name} ${withUnit(values[index])}`.trim());
+    if (this.#limit !== null) told.push(`limit ${withUnit(this.#limit)}`);
+    text(this.newest, told.join(", "));
     attribute(this.canvas, "aria-label", `${this.title} over the last ${SPAN_S} s; its newest values stand above`);
   }
 
@@ -108,18 +111,24 @@ export class Chart {
     this.names.forEach((_, series) => this.#drawSeries(context, colours, frame, series, now_s - SPAN_S));
   }
 
-  /** Where times and values are on the canvas; the values' axis has zero in its middle and reaches to the limits. */
+  /** Where times and values are on the canvas; the values' axis has zero in its middle. */
   #frame(width, height) {
-    let most = Math.max(this.least, (this.#limit ?? 0) * LIMIT_SHARE);
     const from_s = (this.#now_s ?? 0) - SPAN_S;
-    const see = (_, value) => {
-      most = Math.max(most, Math.abs(value) || 0);
-    };
-    this.names.forEach((_, series) => this.#ring.each(series, from_s, see));
+    const most = this.#largest(from_s) * SPARE;
     const [left, right, top, bottom] = [MARGIN.left, width - MARGIN.right, MARGIN.top, height - MARGIN.bottom];
     const x = (time_s) => left + (right - left) * (time_s - from_s) / SPAN_S;
     const y = (value) => (top + bottom) / 2 - (bottom - top) / 2 * value / most;
     return { left, right, top, bottom, most, from_s, x, y };
+  }
+
+  /** The largest value in sight; a limit counts once a value has come near it. */
+  #largest(from_s) {
+    let most = this.least;
+    const see = (_, value) => {
+      most = Math.max(most, Math.abs(value) || 0);
+    };
+    this.names.forEach((_, series) => this.#ring.each(series, from_s, see));
+    return most > NEAR_LIMIT * this.#limit ? Math.max(most, this.#limit ?? 0) : most;
   }
 
   #drawAxes(context, colours, { left, right, top, bottom, most, from_s, x, y }) {
@@ -134,17 +143,25 @@ export class Chart {
     for (let ago_s = 0; ago_s <= SPAN_S; ago_s += TICK_S) {
       const at = x(from_s + SPAN_S - ago_s);
       rule(context, [at, top], [at, bottom]);
-      if (ago_s % (2 * TICK_S) === 0) context.fillText(ago_s ? `−${ago_s} s` : "now", Math.min(at, right - 12), bottom + 4);
+      const name = ago_s ? `−${ago_s} s` : "now";
+      if (ago_s % (2 * TICK_S) === 0) context.fillText(name, Math.min(at, right - 12), bottom + 4);
     }
   }
 
-  #drawLimits(context, colours, { left, right, y }) {
+  /** Both limits as dashed lines; those beyond the axis at its ends, with arrows outwards. */
+  #drawLimits(context, colours, { left, right, top, bottom, most, y }) {
+    const name = `limit ${number(this.#limit, this.digits)} ${this.unit}`;
+    const beyond = this.#limit > most;
     [context.strokeStyle, context.fillStyle, context.lineWidth] = [colours.bad, colours.bad, 1.5];
+    context.textAlign = "left";
     context.setLineDash([7, 4]);
-    for (const limit of [this.#limit, -this.#limit]) rule(context, [left, y(limit)], [right, y(limit)]);
+    const [high, low] = beyond ? [top, bottom] : [y(this.#limit), y(-this.#limit)];
+    for (const at of [high, low]) rule(context, [left, at], [right, at]);
     context.setLineDash([]);
-    [context.textAlign, context.textBaseline] = ["left", "top"];
-    context.fillText(`limit ${number(this.#limit, this.digits)} ${this.unit}`, left + 4, y(this.#limit) + 2);
+    context.textBaseline = "top";
+    context.fillText(beyond ? `▲ ${name}` : name, left + 4, high + 3);
+    context.textBaseline = "bottom";
+    context.fillText(beyond ? `▼ ${name}` : name, left + 4, low - 2);
   }
 
   #drawSeries(context, colours, { x, y }, series, from_s) {

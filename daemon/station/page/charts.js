@@ -14,8 +14,8 @@ const SPEED = { title: "Speed", unit: "m/s", digits: 3, names: ["actual", "targe
 export class ErrorCharts {
   constructor(station) {
     this.charts = ERRORS.map((error) => ({ ...error, chart: new Chart(station, { ...error, names: [""] }) }));
-    const figures = this.charts.map(({ chart }) => chart.element);
-    this.element = h("div", { class: "charts" }, ...figures);
+    this.empty = h("p", { class: "muted" }, "Charts appear while a path is driven.");
+    this.element = h("div", { class: "charts" }, this.empty, ...this.charts.map(({ chart }) => chart.element));
     station.on("status", ({ time_s, vehicle }) => this.#took(time_s, vehicle?.following ?? null));
     station.on("robot", () => this.#forget());
     this.#forget();
@@ -23,18 +23,20 @@ export class ErrorCharts {
 
   #took(time_s, following) {
     if (!following) return;
+    this.empty.hidden = true;
     for (const { key, scale, chart } of this.charts) {
       const [value, limit] = [following[key], following.limits?.[key]];
-      if (key === "bending_error_deg" && value != null) chart.element.hidden = false;
+      if (value != null) chart.element.hidden = false;
       chart.add(time_s, [value == null ? null : value * scale], limit == null ? null : limit * scale);
     }
   }
 
-  /** A vehicle without a trailer has no bending angle. */
+  /** A chart is shown once it has a value: a vehicle without a trailer has no bending angle. */
   #forget() {
-    for (const { key, chart } of this.charts) {
+    this.empty.hidden = false;
+    for (const { chart } of this.charts) {
       chart.clear();
-      chart.element.hidden = key === "bending_error_deg";
+      chart.element.hidden = true;
     }
   }
 }

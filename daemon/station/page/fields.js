@@ -12,7 +12,7 @@ import { attribute, h } from "./dom.js";
 export function field(label, limits, change) {
   const input = h("input", { type: "number", inputmode: "decimal", step: "any", "aria-label": label, ...limits });
   input.addEventListener("change", () => {
-    const good = input.checkValidity();
+    const good = input.reportValidity();
     attribute(input, "aria-invalid", !good && "true");
     if (good) change(input.value === "" ? null : input.valueAsNumber);
   });
@@ -27,9 +27,10 @@ export function choice(label, names, change) {
   return select;
 }
 
-/** Show a value in an input, but for one that is being written. */
+/** Show a value in an input, but for one that somebody may be writing in. */
 export function put(input, value) {
-  const told = String(value);
-  const writing = input.type === "number" && input === document.activeElement && Number(input.value) === Number(told);
-  if (input.value !== told && !writing) input.value = told;
+  const writing = input.type === "number" && input === document.activeElement;
+  if (writing || input.value === String(value)) return;
+  input.value = value;
+  attribute(input, "aria-invalid", null);
 }

@@ -4,6 +4,9 @@ import { allow, h, number, text } from "./dom.js";
 import { field, put } from "./fields.js";
 
 const METHOD = "drive.path";
+const HINT =
+  "Backwards exchanges forward and backward in the whole path. The page holds the drive: hide or close it, and the "
+  + "vehicle comes to rest.";
 
 /** The controls under the editor; `speed_m_s()` and `lasts(length_m)` are of use to the check. */
 export class Following {
@@ -28,7 +31,8 @@ export class Following {
 
   #way(way) {
     const backward = way === "backwards";
-    const input = h("input", { type: "radio", name: "path-way", value: way, onchange: () => this.editor.set("exchanged", backward) });
+    const change = () => this.editor.set("exchanged", backward);
+    const input = h("input", { type: "radio", name: "path-way", value: way, onchange: change });
     input.checked = !backward;
     return input;
   }
@@ -42,8 +46,7 @@ export class Following {
       h("div", { class: "row bottom" }, ...ways, h("label", { class: "field" }, "Speed [m/s]", this.speed)),
       h("div", { class: "row" }, this.driveButton, this.stopButton),
       this.reason,
-      h("p", { class: "muted" }, "Backwards exchanges forward and backward in the whole path. The page holds the drive: "
-        + "hide or close it, and the vehicle comes to rest."),
+      h("p", { class: "muted" }, HINT),
       this.progress,
       this.result,
     );
@@ -82,7 +85,8 @@ export class Following {
   #watchTab() {
     if (!document.hidden || !this.#driving) return;
     this.station.attempt(this.station.call("lease.close", {}, { timeout_ms: 15_000 }), "Letting go");
-    this.station.say("The page was hidden: the vehicle comes to rest", "warning", "keep the page in sight while it drives");
+    const remedy = "keep the page in sight while it drives";
+    this.station.say("The page was hidden: the vehicle comes to rest", "warning", remedy);
   }
 
   // --- showing --------------------------------------------------------------------------------------------------

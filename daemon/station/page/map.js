@@ -5,7 +5,7 @@ import { font, palette, sharp } from "./canvas.js";
 import { attribute, h, number, redraw, text } from "./dom.js";
 import { listen } from "./map_gestures.js";
 import { MapView } from "./map_view.js";
-import { drawEdited, drawPieces } from "./path_drawing.js";
+import { drawEdited, drawHandles, drawPieces } from "./path_drawing.js";
 import { editorOf } from "./path_editor.js";
 import { bounds, nearest, sample } from "./path_geometry.js";
 import { PathHandles } from "./path_handles.js";
@@ -53,7 +53,8 @@ class MapPanel {
 
   #make() {
     this.canvas = h("canvas", { class: "map-canvas", role: "img", "aria-label": "Map: no vehicle yet" });
-    this.followButton = h("button", { type: "button", "aria-pressed": "true", onclick: () => this.#follow() }, "Follow");
+    const follow = { type: "button", "aria-pressed": "true", onclick: () => this.#follow() };
+    this.followButton = h("button", { ...follow, "aria-label": "Follow the vehicle" }, "Follow");
     const zoom = (factor) => () => this.#zoomed(factor);
     this.cursorText = h("output", { class: "map-cursor", "aria-label": "Place of the pointer" });
     this.staleText = h("p", { class: "map-stale", hidden: true }, "Values are stale");
@@ -200,6 +201,7 @@ class MapPanel {
     this.#drawWays(context, colours);
     const vehicle = this.station.status?.vehicle;
     if (placeOf(vehicle)) drawVehicle(context, view, colours, this.station.shape, vehicle);
+    if (!this.active.pieces) drawHandles(context, view, colours, this.editor);
     view.drawScaleBar(context, colours);
     this.#drawTexts();
   }
@@ -226,16 +228,17 @@ class MapPanel {
   }
 
   #drawWays(context, colours) {
-    [context.strokeStyle, context.lineWidth] = [colours.series[2], 1.5];
+    if (this.active.pieces) drawPieces(context, this.#view, this.active.pieces, colours.good, 4);
+    else this.#drawEditor(context, colours);
+    [context.strokeStyle, context.lineWidth] = [colours.series[3], 2];
     this.#trail.draw(context, this.#view);
-    if (this.active.pieces) {
-      drawPieces(context, this.#view, this.active.pieces, colours.good, 3);
-      return;
-    }
+  }
+
+  /** The path in the editor, and what a click would add to it. */
+  #drawEditor(context, colours) {
     drawEdited(context, this.#view, colours, this.editor);
     const { hovered } = this.handles;
-    if (!hovered) return;
-    const piece = this.editor.builtWith(hovered).pieces.at(-1);
+    const piece = hovered && this.editor.builtWith(hovered).pieces.at(-1);
     if (piece) drawPieces(context, this.#view, [piece], colours.muted, 2);
   }
 

@@ -6,7 +6,7 @@ const LEAST_PX_M = 2;
 const MOST_PX_M = 2000;
 const GRID_PX = 60;
 const SHARE_OF_FIT = 0.85;
-const LEAST_SPAN_M = 2;
+const LEAST_SPAN_M = 4;
 
 /** The least of 1, 2, 5, 10, ... (and their tenths) that is at least a value. */
 export function niceStep(least) {

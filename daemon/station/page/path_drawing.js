@@ -23,7 +23,7 @@ export function drawPieces(context, view, pieces, colour, width) {
   context.setLineDash([]);
 }
 
-/** The path in the editor with the chosen piece and the one that is wrong, and its handles. */
+/** The path in the editor with the chosen piece and the one that is wrong. */
 export function drawEdited(context, view, colours, editor) {
   const { pieces } = editor.built();
   drawPieces(context, view, pieces, colours.series[0], 3);
@@ -32,7 +32,11 @@ export function drawEdited(context, view, colours, editor) {
     drawPieces(context, view, [pieces[editor.chosen]], colours.accent, 6);
   }
   if (wrong !== null && pieces[wrong]) drawPieces(context, view, [pieces[wrong]], colours.bad, 5);
-  pieces.forEach((piece, index) => drawEnd(context, view, colours, piece, index));
+}
+
+/** What the path in the editor is held by. */
+export function drawHandles(context, view, colours, editor) {
+  editor.built().pieces.forEach((piece, index) => drawEnd(context, view, colours, piece, index));
   drawStart(context, view, colours, editor);
 }
 

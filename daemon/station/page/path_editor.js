@@ -29,8 +29,8 @@ const rounded = (value, digits) => Number(value.toFixed(digits));
 /**
  * Dispatches `change` whenever the path, the choice in it or the way to drive it is another one.
  *
- * entries: {kind: "line", length_m, backward} and {kind: "arc", radius_m, arc_deg, backward}, each going on where the one
- * before it ends. start: {x_m, y_m, heading_deg}, or null for a path that begins where the vehicle is.
+ * entries: {kind: "line", length_m, backward} and {kind: "arc", radius_m, arc_deg, backward}, each going on where the
+ * one before it ends. start: {x_m, y_m, heading_deg}, or null for a path that begins where the vehicle is.
  */
 export class PathEditor extends EventTarget {
   #station;

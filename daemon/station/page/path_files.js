@@ -1,6 +1,7 @@
 /** Paths that are kept: load, save, delete, import, export, and recording the way that is driven. */
 
 import { allow, h, text } from "./dom.js";
+import { Question } from "./question.js";
 
 const NAME = "[A-Za-z0-9][A-Za-z0-9_\\-]{0,59}";
 
@@ -10,10 +11,10 @@ export class PathFiles {
 
   constructor(station, editor) {
     [this.station, this.editor] = [station, editor];
-    this.select = h("select", { "aria-label": "Kept paths", onchange: () => this.show() });
-    this.name = h("input", { type: "text", pattern: NAME, maxlength: 60, "aria-label": "Name of the path", oninput: () => this.show() });
-    this.file = h("input", { type: "file", accept: ".json,application/json", class: "unseen", "aria-label": "Path file", tabindex: -1 });
-    this.file.addEventListener("change", () => this.#import());
+    this.select = h("select", { onchange: () => this.show() });
+    this.name = h("input", { type: "text", pattern: NAME, maxlength: 60, oninput: () => this.show() });
+    this.file = h("input", { type: "file", accept: ".json", hidden: true, onchange: () => this.#import() });
+    this.question = new Question("Confirm");
     this.buttons = {
       load: this.#button("Load", () => this.#load()),
       remove: this.#button("Delete", () => this.#delete()),
@@ -34,13 +35,15 @@ export class PathFiles {
 
   #fieldset() {
     const { load, remove, save, importing, exporting, record } = this.buttons;
+    const row = (...parts) => h("div", { class: "row bottom" }, ...parts);
     return h(
       "fieldset",
       {},
       h("legend", {}, "Kept paths"),
-      h("div", { class: "row bottom" }, h("label", { class: "field" }, "Path", this.select), load, remove),
-      h("div", { class: "row bottom" }, h("label", { class: "field" }, "Name", this.name), save, importing, exporting, this.file),
-      h("div", { class: "row" }, record),
+      row(h("label", { class: "field" }, "Path", this.select), load, remove),
+      row(h("label", { class: "field" }, "Name", this.name), save, importing, exporting, this.file),
+      this.question.element,
+      row(record),
       this.told,
     );
   }
@@ -70,6 +73,7 @@ export class PathFiles {
     this.select.replaceChildren();
     this.name.value = "";
     text(this.told, "");
+    this.question.close();
     this.#recording = false;
   }
 
@@ -96,19 +100,26 @@ export class PathFiles {
     text(this.told, told);
   }
 
-  async #save() {
+  #save() {
     const name = this.name.value;
     const exists = [...this.select.options].some(({ value }) => value === name);
-    if (exists && !confirm(`Replace the path ${name}?`)) return;
-    const params = { name, path: this.editor.spec(), replace: exists };
+    if (exists) this.question.ask(`Replace the path ${name}?`, "Replace", () => this.#write(name, true));
+    else this.#write(name, false);
+  }
+
+  async #write(name, replace) {
+    const params = { name, path: this.editor.spec(), replace };
     if (!(await this.station.attempt(this.station.call("station.path.write", params), `Path ${name}`))) return;
     text(this.told, `${name} is saved.`);
     this.#list(name);
   }
 
-  async #delete() {
+  #delete() {
     const name = this.select.value;
-    if (!confirm(`Delete the path ${name}?`)) return;
+    this.question.ask(`Delete the path ${name}?`, "Delete for good", () => this.#remove(name));
+  }
+
+  async #remove(name) {
     if (!(await this.station.attempt(this.station.call("station.path.delete", { name }), `Path ${name}`))) return;
     text(this.told, `${name} is deleted.`);
     this.#list();
@@ -153,8 +164,9 @@ export class PathFiles {
     this.#recording = false;
     const call = this.station.call("station.record.stop", { keep: false }, { timeout_ms: 60_000 });
     const answer = await this.station.attempt(call, "Recording");
-    if (!answer) text(this.told, "Nothing was recorded.");
-    else this.#take(answer.path, `The recorded way is in the editor: ${answer.length_m.toFixed(2)} m, ${answer.pieces} pieces.`);
+    if (!answer) return text(this.told, "Nothing was recorded.");
+    const { path, length_m, pieces } = answer;
+    return this.#take(path, `The recorded way is in the editor: ${length_m.toFixed(2)} m, ${pieces} pieces.`);
   }
 }
 
@@ -166,7 +178,8 @@ function titled(name, length_m) {
 function asPath(content) {
   try {
     const path = JSON.parse(content);
-    return Array.isArray(path?.pieces) && path.pieces.every((piece) => piece && typeof piece === "object") ? path : null;
+    const good = Array.isArray(path?.pieces) && path.pieces.every((piece) => piece && typeof piece === "object");
+    return good ? path : null;
   } catch {
     return null;
   }

@@ -131,7 +131,7 @@ class Chain {
     this.turnRound(entry.drive);
     const begin = { x_m: entry.from_m?.[0] ?? this.x_m, y_m: entry.from_m?.[1] ?? this.y_m };
     const pieces = this.made(entry, { ...begin, direction_rad: this.direction_rad });
-    if (!pieces?.length || !pieces.every((piece) => piece.length_m > 0 && Number.isFinite(piece.length_m))) return false;
+    if (!pieces?.length || !pieces.every(({ length_m }) => length_m > 0 && Number.isFinite(length_m))) return false;
     if (this.pieces.length || entry.from_m) this.meet(pieces[0]);
     for (const piece of pieces) this.pieces.push({ ...piece, entry: number });
     this.goToEnd(pieces.at(-1));

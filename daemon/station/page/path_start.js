@@ -12,12 +12,13 @@ export class StartFields {
     this.editor = editor;
     this.here = h("input", { type: "checkbox", id: "path-here", onchange: () => this.#toggle() });
     this.fields = {
-      x_m: field("Start x in metres", PLACE, (x_m) => this.#change({ x_m })),
-      y_m: field("Start y in metres", PLACE, (y_m) => this.#change({ y_m })),
-      heading_deg: field("Start heading in degrees", TURN, (heading_deg) => this.#change({ heading_deg })),
+      x_m: field("x of the start in metres", PLACE, (x_m) => this.#change({ x_m })),
+      y_m: field("y of the start in metres", PLACE, (y_m) => this.#change({ y_m })),
+      heading_deg: field("Heading of the start in degrees", TURN, (heading_deg) => this.#change({ heading_deg })),
     };
     const named = { x_m: "x [m]", y_m: "y [m]", heading_deg: "Heading [°]" };
-    const fields = Object.entries(this.fields).map(([name, input]) => h("label", { class: "field" }, named[name], input));
+    const labelled = ([name, input]) => h("label", { class: "field" }, named[name], input);
+    const fields = Object.entries(this.fields).map(labelled);
     const tick = h("label", { class: "tick", for: "path-here" }, this.here, "Begin where the vehicle is");
     this.element = h("fieldset", {}, h("legend", {}, "Start"), h("div", { class: "row bottom" }, tick, ...fields));
   }

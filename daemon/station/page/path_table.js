@@ -4,7 +4,7 @@ import { attribute, h } from "./dom.js";
 import { choice, field, put } from "./fields.js";
 import { Rows, table } from "./rows.js";
 
-const HEADS = ["Piece", "Shape", "Length [m]", "Radius [m]", "Turn [°], left positive", "Drive", "Remove"];
+const HEADS = ["No.", "Shape", "Length [m]", "Radius [m]", "Turn left [°]", "Drive", "Remove"];
 const LENGTH = { min: 0.01, max: 10000, required: true };
 const TURN = { min: -3600, max: 3600, required: true };
 const SHAPES = { line: "line", arc: "arc" };
@@ -37,14 +37,16 @@ export class PathTable {
 
   #make(index) {
     const change = (numbers) => this.editor.change(index, numbers);
+    const of = `of piece ${index}`;
     const cells = {
-      kind: choice(`Shape of piece ${index}`, SHAPES, (kind) => this.#reshape(index, kind)),
-      length_m: field(`Length of piece ${index} in metres`, LENGTH, (length_m) => change({ length_m })),
-      radius_m: field(`Radius of piece ${index} in metres`, LENGTH, (radius_m) => change({ radius_m })),
-      arc_deg: field(`Turn of piece ${index} in degrees`, TURN, (arc_deg) => arc_deg && change({ arc_deg })),
-      drive: choice(`Driving direction of piece ${index}`, DRIVES, (drive) => change({ backward: drive === "backward" })),
+      kind: choice(`Shape ${of}`, SHAPES, (kind) => this.#reshape(index, kind)),
+      length_m: field(`Length ${of} in metres`, LENGTH, (length_m) => change({ length_m })),
+      radius_m: field(`Radius ${of} in metres`, LENGTH, (radius_m) => change({ radius_m })),
+      arc_deg: field(`Turn ${of} in degrees, left positive`, TURN, (arc_deg) => arc_deg && change({ arc_deg })),
+      drive: choice(`Driving direction ${of}`, DRIVES, (drive) => change({ backward: drive === "backward" })),
     };
-    const remove = h("button", { type: "button", "aria-label": `Remove piece ${index}`, onclick: () => this.#remove(index) }, "✕");
+    const act = { type: "button", "aria-label": `Remove piece ${index}`, onclick: () => this.#remove(index) };
+    const remove = h("button", act, "✕");
     const head = h("th", { scope: "row" }, String(index));
     const columns = [...Object.values(cells), remove].map((cell) => h("td", {}, cell));
     const element = h("tr", { onfocusin: () => this.editor.set("chosen", index) }, head, ...columns);

@@ -13,8 +13,8 @@ import { openNewestRun } from "./runs.js";
 
 const WRITING = "input, textarea, select";
 const HINT =
-  "On the map drag the square where the path begins, its knob, and the dots where pieces end; add lines and arcs by clicks. "
-  + "Alt switches the snap off, Ctrl-Z and Ctrl-Y undo and redo.";
+  "On the map drag the square where the path begins, its knob, and the dots where pieces end; add lines and arcs by "
+  + "clicks. Alt switches the snap off, Ctrl-Z and Ctrl-Y undo and redo.";
 
 /** The panel. */
 export function create(station) {
@@ -40,18 +40,19 @@ class PathsPanel {
 
   #make() {
     this.lacking = h("p", { class: "reason", hidden: true }, "This vehicle follows no paths.");
-    this.body = h(
-      "div",
-      { class: "path-body" },
-      this.verdict.element,
-      this.following.element,
-      h("section", { "aria-labelledby": "errors-title" }, h("h3", { id: "errors-title" }, "Errors beside the path"), this.errors.element,
-        h("a", { href: "#runs", onclick: openNewestRun }, "Open the newest run with its picture")),
-      this.#editorPart(),
-      this.files.element,
-    );
-    const speeds = h("details", { ontoggle: () => this.speeds.chart.changed() }, h("summary", {}, "Speed of a drive"), this.speeds.element);
-    this.element = h("section", { "aria-labelledby": "paths-title" }, h("h2", { id: "paths-title" }, "Paths"), this.lacking, this.body, speeds);
+    const { verdict, following, files, speeds } = this;
+    const parts = [verdict.element, following.element, this.#errorsPart(), this.#editorPart(), files.element];
+    this.body = h("div", { class: "path-body" }, ...parts);
+    const unfold = { ontoggle: () => speeds.chart.changed() };
+    const fold = h("details", unfold, h("summary", {}, "Speed of a drive"), speeds.element);
+    const title = h("h2", { id: "paths-title" }, "Paths");
+    this.element = h("section", { "aria-labelledby": "paths-title" }, title, this.lacking, this.body, fold);
+  }
+
+  #errorsPart() {
+    const title = h("h3", { id: "errors-title" }, "Errors beside the path, left positive");
+    const open = h("a", { class: "button", href: "#runs", onclick: openNewestRun }, "Open the newest run");
+    return h("section", { class: "path-errors", "aria-labelledby": "errors-title" }, title, this.errors.element, open);
   }
 
   #editorPart() {
@@ -61,14 +62,15 @@ class PathsPanel {
     this.redo = button("Redo", () => editor.redo());
     this.clear = button("Clear", () => editor.clear());
     this.snap = h("input", { type: "checkbox", onchange: () => editor.set("snaps", this.snap.checked) });
-    const adding = [button("Insert a line", () => editor.insert("line")), button("Insert an arc", () => editor.insert("arc"))];
+    const line = button("Insert a line", () => editor.insert("line"));
+    const arc = button("Insert an arc", () => editor.insert("arc"));
     return h(
       "fieldset",
       {},
       h("legend", {}, "Pieces"),
       this.start.element,
       this.table.element,
-      h("div", { class: "row" }, ...adding, this.undo, this.redo, this.clear),
+      h("div", { class: "row" }, line, arc, this.undo, this.redo, this.clear),
       h("label", { class: "tick" }, this.snap, "Snap to 0.1 m and 5°"),
       h("p", { class: "muted" }, HINT),
     );

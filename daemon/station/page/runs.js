@@ -42,10 +42,11 @@ class RunsPanel {
     this.picture.addEventListener("load", () => this.#drawn());
     this.picture.addEventListener("error", () => this.#notDrawn());
     this.drawing = h("p", { class: "reason", role: "status" });
+    const title = h("h2", { id: "runs-title" }, "Runs");
     const row = h("div", { class: "row" }, this.button);
-    const scroll = h("div", { class: "scroll runs-table", tabindex: 0, role: "region", "aria-label": "Table of runs" }, element);
-    const opened = h("section", { "aria-label": "Opened run" }, this.title, this.drawing, this.picture);
-    this.element = h("section", { "aria-labelledby": "runs-title" }, h("h2", { id: "runs-title" }, "Runs"), row, this.told, opened, scroll);
+    this.opened = h("section", { "aria-label": "Opened run", hidden: true }, this.title, this.drawing, this.picture);
+    const parts = [title, row, this.told, this.opened, h("div", { class: "scroll" }, element)];
+    this.element = h("section", { "aria-labelledby": "runs-title" }, ...parts);
   }
 
   #seen() {
@@ -82,8 +83,10 @@ class RunsPanel {
   // --- one run --------------------------------------------------------------------------------------------------
 
   #row(run) {
-    const open = h("button", { type: "button", "aria-label": `Open run ${run.run}`, onclick: () => this.#open(run) }, run.run);
-    const cells = { begun: h("td"), method: h("td"), ended: h("td"), duration: h("td", { class: "number" }), files: h("td") };
+    const act = { type: "button", "aria-label": `Open run ${run.run}`, onclick: () => this.#open(run) };
+    const open = h("button", act, run.run);
+    const [begun, method, ended, files] = [h("td"), h("td"), h("td"), h("td")];
+    const cells = { begun, method, ended, duration: h("td", { class: "number" }), files };
     const element = h("tr", {}, h("th", { scope: "row" }, open), ...Object.values(cells));
     return { element, show: (now) => this.#fill(element, cells, now) };
   }
@@ -99,7 +102,8 @@ class RunsPanel {
 
   /** Downloads behind a name that can be opened: a run has half a dozen files. */
   #links(run, files) {
-    const links = files.map((file) => h("li", {}, h("a", { href: this.#address(run, file), download: `${run}-${file}` }, file)));
+    const link = (file) => h("a", { href: this.#address(run, file), download: `${run}-${file}` }, file);
+    const links = files.map((file) => h("li", {}, link(file)));
     return h("details", {}, h("summary", {}, `${files.length} files`), h("ul", { class: "run-files" }, ...links));
   }
 
@@ -109,6 +113,7 @@ class RunsPanel {
 
   #open({ run, method }) {
     this.#chosen = run;
+    this.opened.hidden = false;
     text(this.title, `Run ${run}: ${method}`);
     text(this.drawing, "Drawing its picture …");
     this.picture.hidden = true;
@@ -131,9 +136,7 @@ class RunsPanel {
 
   #close() {
     this.#chosen = null;
-    this.picture.hidden = true;
+    this.opened.hidden = true;
     attribute(this.picture, "src", null);
-    text(this.title, "");
-    text(this.drawing, "");
   }
 }
