@@ -49,6 +49,7 @@ COMMANDS: dict[Group, dict[str, str]] = {
         "plot": "daemon.cli.plot:plot",
         "record": "daemon.cli.record:record",
         "replay": "daemon.cli.replay:replay",
+        "station": "daemon.cli.station:station",
     },
     NETWORK: {
         "nodes": "daemon.cli.nodes:app",

@@ -49,14 +49,13 @@ _METHODS: Final[tuple[tuple[Method, Function], ...]] = (
         paths.write_path,
     ),
     (Method("station.path.delete", "Delete a path for good.", (_NAME,), "name"), paths.delete_path),
-    (Method("station.record.start", "Note where the vehicle goes.", (), "recording", Role.WATCH), recording.start),
+    (Method("station.record.start", "Note where the vehicle goes.", (), "recording"), recording.start),
     (
         Method(
             "station.record.stop",
             "End that; the driven path as lines and arcs.",
             (Param("keep", "boolean", "keep it as a path, too", default=False),),
             "path, length_m, pieces",
-            Role.WATCH,
         ),
         recording.stop,
     ),

@@ -34,10 +34,15 @@ class Robots:
 
     Args:
         names: of those that are offered; none: every robot that has a socket.
+
+    Raises:
+        UsageError: a name is none.
     """
 
     def __init__(self, names: Collection[str] = ()) -> None:
         self._names = tuple(dict.fromkeys(names))
+        for name in self._names:
+            protocol.choose_socket(robot=name)
 
     def find(self, name: str) -> Robot:
         """A robot by its name.
@@ -60,13 +65,14 @@ class Robots:
 
 def _sockets() -> dict[str, Path]:
     """Sockets by the names of their robots; a service's goes before a person's."""
-    found = [path for folder in (protocol.SYSTEM_FOLDER, protocol.user_folder()) for path in _sockets_in(folder)]
-    return {path.stem: path for path in reversed(found)}
+    folders = (protocol.user_folder(), protocol.SYSTEM_FOLDER)
+    found = {path.stem: path for folder in folders for path in _sockets_in(folder)}
+    return dict(sorted(found.items()))
 
 
 def _sockets_in(folder: Path) -> list[Path]:
     try:
-        return sorted((path for path in folder.glob("*.sock") if _is_api(path)), reverse=True)
+        return [path for path in folder.glob("*.sock") if _is_api(path)]
     except OSError:
         return []
 

@@ -1,0 +1,233 @@
+"""One page and one daemon: requests and answers go both ways as they come, within what the page may do.
+
+Each page has a connection of its own to the daemon, so that lease, subscription and place are its own there, too. What
+a page asks for is written to the daemon at once; what the daemon says waits for a page that reads slowly.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import socket
+from typing import Any, Final
+
+from aiohttp import WSMsgType, web
+
+from canhelm import protocol
+from canhelm.errors import CanhelmError, Refused, UsageError
+from daemon.api.parameters import Method, Role, validate
+from daemon.station.limits import lowered, refusal
+from daemon.station.methods import METHODS, PREFIX, Function
+from daemon.station.outbox import Outbox
+from daemon.station.robots import Robot
+
+LOGGER: Final = logging.getLogger("canhelm.station")
+NO_DAEMON: Final = 4404
+"""Code of a WebSocket whose daemon is not there, or has gone."""
+POLICY: Final = 1008
+"""Code of one whose page sends nonsense (RFC 6455, 7.4.1)."""
+MAX_MALFORMED: Final = 50
+"""Messages that are no request after which a page is hung up on."""
+MAX_PENDING: Final = 8
+"""Methods of the station itself that one page may have under way."""
+STALLED_S: Final = 10.0
+"""Time without reading after which a page is hung up on."""
+UNSENT_BYTES: Final = 16 * 1024
+"""What the kernel holds for a page beyond what is on its way: samples that wait there would only get older."""
+_REASON_BYTES: Final = 123
+"""Of the reason with which a WebSocket closes (RFC 6455, 5.5)."""
+_FAREWELL: Final = b'{"jsonrpc":"2.0","id":null,"error"'
+
+Ending = tuple[int, str]
+"""Code and reason with which a WebSocket closes."""
+
+
+class Link:
+    """A page that is connected to a robot's daemon.
+
+    Args:
+        page: the WebSocket.
+        transport: of the page.
+        robot: the robot.
+        limit: the most that the page may do.
+    """
+
+    def __init__(
+        self,
+        page: web.WebSocketResponse,
+        transport: asyncio.Transport,
+        robot: Robot,
+        limit: Role,
+    ) -> None:
+        self._page = page
+        self._transport = transport
+        self._robot = robot
+        self._limit = limit
+        self._outbox = Outbox()
+        self._malformed = 0
+        self._own: set[asyncio.Task[None]] = set()
+
+    async def run(self, connection: socket.socket) -> None:
+        """Carry messages until one end hangs up, then hang up on the other.
+
+        Args:
+            connection: to the daemon.
+        """
+        self._transport.set_write_buffer_limits(high=0)
+        page_socket = self._transport.get_extra_info("socket")
+        page_socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, UNSENT_BYTES)
+        connection.setblocking(False)
+        reader, writer = await asyncio.open_connection(sock=connection, limit=protocol.MAX_ANSWER_BYTES)
+        ways = [asyncio.create_task(way) for way in (self._ask(writer), self._hear(reader), self._tell())]
+        try:
+            done, _ = await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            writer.close()
+            await _cancel([*ways, *self._own])
+        ending = next((way.result() for way in done if way.result() is not None), None)
+        if ending is not None:
+            await hang_up(self._page, *ending)
+        if self._outbox.lost:
+            LOGGER.info("a page of %s has read too slowly for %d notifications", self._robot.name, self._outbox.lost)
+
+    def _give_up(self, reason: str) -> None:
+        """Hang up on a page that would not read a farewell."""
+        LOGGER.warning("a page of %s is hung up on: %s", self._robot.name, reason)
+        self._transport.abort()
+
+    # -- from the page ------------------------------------------------------------------------------------------------
+
+    async def _ask(self, daemon: asyncio.StreamWriter) -> Ending | None:
+        """Carry requests to the daemon."""
+        async for message in self._page:
+            line = self._taken(message.data) if message.type is WSMsgType.TEXT else self._refuse_malformed("no text")
+            if self._malformed >= MAX_MALFORMED:
+                return POLICY, "this page sends nonsense"
+            if self._outbox.overfull:
+                return self._give_up("it does not read its answers")
+            if line is not None:
+                daemon.write(line)
+                try:
+                    await daemon.drain()
+                except ConnectionError:
+                    return self._gone()
+        return None
+
+    def _taken(self, text: str) -> bytes | None:
+        """What goes to the daemon for a message: made anew, so that a line is one request; None: nothing."""
+        message = protocol.parse_message(text.encode())
+        if isinstance(message, str):
+            return self._refuse_malformed(message)
+        request, name = message.get("id"), message.get("method")
+        if isinstance(request, bool) or not isinstance(request, int | str | None) or not isinstance(name, str):
+            return self._refuse_malformed("no request")
+        refused = refusal(name, self._limit)
+        if refused is not None:
+            self._answer(request, refused)
+        elif name.startswith(PREFIX):
+            self._begin(request, name, message.get("params", {}))
+        else:
+            return self._line(message)
+        return None
+
+    def _line(self, message: dict[str, Any]) -> bytes | None:
+        try:
+            line = protocol.make_message(message)
+        except RecursionError:
+            return self._refuse_malformed("it is nested too deeply")
+        if len(line) > protocol.MAX_REQUEST_BYTES:
+            return self._refuse_malformed(f"a request is longer than {protocol.MAX_REQUEST_BYTES} bytes")
+        return line
+
+    def _refuse_malformed(self, reason: str) -> None:
+        self._malformed += 1
+        remedy = "send one JSON-RPC 2.0 object a message; api.schema lists the methods"
+        self._answer(None, UsageError(reason, remedy=remedy), protocol.INVALID_REQUEST)
+
+    # -- methods of the station itself --------------------------------------------------------------------------------
+
+    def _begin(self, request: int | str | None, name: str, params: Any) -> None:
+        try:
+            method, function = self._own_method(name, params)
+            checked = validate(method, params)
+        except CanhelmError as error:
+            self._answer(request, error, error.rpc_code if name in METHODS else protocol.METHOD_NOT_FOUND)
+            return
+        task = asyncio.create_task(self._carry_out(request, method, function, checked))
+        self._own.add(task)
+        task.add_done_callback(self._own.discard)
+
+    def _own_method(self, name: str, params: Any) -> tuple[Method, Function]:
+        if name not in METHODS:
+            raise UsageError(f"no method {name[:80]!r}", remedy=f"the station has {', '.join(METHODS)}")
+        if not isinstance(params, dict):
+            raise UsageError(f"{name}: params is no object", remedy="send parameters by their names")
+        if len(self._own) >= MAX_PENDING:
+            raise Refused("too many requests under way", limit=MAX_PENDING, remedy="wait for answers")
+        return METHODS[name]
+
+    async def _carry_out(
+        self, request: int | str | None, method: Method, function: Function, params: dict[str, Any]
+    ) -> None:
+        try:
+            result = await function(self._robot, params)
+        except CanhelmError as error:
+            self._answer(request, error)
+        except Exception:
+            LOGGER.exception("%s failed", method.name)
+            defect = CanhelmError(f"{method.name} failed inside the station", remedy="report it with the station's log")
+            self._answer(request, defect, protocol.INTERNAL_ERROR)
+        else:
+            self._outbox.put(protocol.make_result(request, result))
+
+    def _answer(self, request: int | str | None, error: CanhelmError, code: int | None = None) -> None:
+        self._outbox.put(protocol.make_error(request, code or error.rpc_code, error.message, error.data()))
+
+    # -- to the page --------------------------------------------------------------------------------------------------
+
+    async def _hear(self, daemon: asyncio.StreamReader) -> Ending | None:
+        """Take what the daemon says."""
+        farewell = ""
+        try:
+            while line := await daemon.readline():
+                farewell = _farewell(line)
+                self._outbox.put(line)
+                if self._outbox.overfull:
+                    return self._give_up("it does not read its answers")
+        except (OSError, ValueError):
+            pass  # a broken pipe and an endless line end the connection like a hang-up
+        return self._gone(farewell)
+
+    async def _tell(self) -> Ending | None:
+        """Carry that to the page."""
+        while True:
+            line = lowered(await self._outbox.get(), self._limit)
+            try:
+                async with asyncio.timeout(STALLED_S):
+                    await self._page.send_frame(line.rstrip(), WSMsgType.TEXT)
+            except TimeoutError:
+                return self._give_up("it stopped reading")
+            except ConnectionError:
+                return None
+
+    def _gone(self, farewell: str = "") -> Ending:
+        return NO_DAEMON, farewell or f"the daemon of {self._robot.name} hung up"
+
+
+async def hang_up(page: web.WebSocketResponse, code: int, reason: str) -> None:
+    """Close a WebSocket with a code and as much of a reason as fits."""
+    await page.close(code=code, message=reason.encode()[:_REASON_BYTES].decode(errors="ignore").encode())
+
+
+def _farewell(line: bytes) -> str:
+    """What a daemon says before it hangs up; empty for other messages."""
+    if not line.startswith(_FAREWELL):
+        return ""
+    message = protocol.parse_message(line)
+    return str(message["error"].get("message", "")) if isinstance(message, dict) else ""
+
+
+async def _cancel(tasks: list[asyncio.Task[Any]]) -> None:
+    for task in tasks:
+        task.cancel()
+    await asyncio.gather(*tasks, return_exceptions=True)
