@@ -11,7 +11,7 @@ import logging
 import socket
 from typing import Any, Final
 
-from aiohttp import WSMsgType, web
+from aiohttp import WSMessage, WSMsgType, web
 
 from canhelm import protocol
 from canhelm.errors import CanhelmError, Refused, UsageError
@@ -19,6 +19,7 @@ from daemon.api.parameters import Method, Role, validate
 from daemon.station.limits import lowered, refusal
 from daemon.station.methods import METHODS, PREFIX, Function
 from daemon.station.outbox import Outbox
+from daemon.station.requests import make_line, parse_request
 from daemon.station.robots import Robot
 
 LOGGER: Final = logging.getLogger("canhelm.station")
@@ -100,55 +101,46 @@ class Link:
     async def _ask(self, daemon: asyncio.StreamWriter) -> Ending | None:
         """Carry requests to the daemon."""
         async for message in self._page:
-            line = self._taken(message.data) if message.type is WSMsgType.TEXT else self._refuse_malformed("no text")
+            try:
+                line = self._taken(message)
+            except UsageError as error:
+                self._malformed += 1
+                self._answer(None, error, protocol.INVALID_REQUEST)
+                line = b""
             if self._malformed >= MAX_MALFORMED:
                 return POLICY, "this page sends nonsense"
             if self._outbox.overfull:
-                return self._give_up("it does not read its answers")
-            if line is not None:
-                daemon.write(line)
-                try:
-                    await daemon.drain()
-                except ConnectionError:
-                    return self._gone()
+                self._give_up("it does not read its answers")
+                return None
+            daemon.write(line)
+            try:
+                await daemon.drain()
+            except ConnectionError:
+                return self._gone()
         return None
 
-    def _taken(self, text: str) -> bytes | None:
-        """What goes to the daemon for a message: made anew, so that a line is one request; None: nothing."""
-        message = protocol.parse_message(text.encode())
-        if isinstance(message, str):
-            return self._refuse_malformed(message)
-        request, name = message.get("id"), message.get("method")
-        if isinstance(request, bool) or not isinstance(request, int | str | None) or not isinstance(name, str):
-            return self._refuse_malformed("no request")
+    def _taken(self, message: WSMessage) -> bytes:
+        """The line that goes to the daemon for a message: none for what the station answers itself.
+
+        Raises:
+            UsageError: the message is no request.
+        """
+        request = parse_request(message.data if message.type is WSMsgType.TEXT else "")
+        request_id, name = request.get("id"), request["method"]
         refused = refusal(name, self._limit)
         if refused is not None:
-            self._answer(request, refused)
+            self._answer(request_id, refused)
         elif name.startswith(PREFIX):
-            self._begin(request, name, message.get("params", {}))
+            self._begin(request_id, name, request.get("params", {}))
         else:
-            return self._line(message)
-        return None
-
-    def _line(self, message: dict[str, Any]) -> bytes | None:
-        try:
-            line = protocol.make_message(message)
-        except RecursionError:
-            return self._refuse_malformed("it is nested too deeply")
-        if len(line) > protocol.MAX_REQUEST_BYTES:
-            return self._refuse_malformed(f"a request is longer than {protocol.MAX_REQUEST_BYTES} bytes")
-        return line
-
-    def _refuse_malformed(self, reason: str) -> None:
-        self._malformed += 1
-        remedy = "send one JSON-RPC 2.0 object a message; api.schema lists the methods"
-        self._answer(None, UsageError(reason, remedy=remedy), protocol.INVALID_REQUEST)
+            return make_line(request)
+        return b""
 
     # -- methods of the station itself --------------------------------------------------------------------------------
 
-    def _begin(self, request: int | str | None, name: str, params: Any) -> None:
+    def _begin(self, request: int | str | None, name: str, params: dict[str, Any]) -> None:
         try:
-            method, function = self._own_method(name, params)
+            method, function = self._own_method(name)
             checked = validate(method, params)
         except CanhelmError as error:
             self._answer(request, error, error.rpc_code if name in METHODS else protocol.METHOD_NOT_FOUND)
@@ -157,11 +149,9 @@ class Link:
         self._own.add(task)
         task.add_done_callback(self._own.discard)
 
-    def _own_method(self, name: str, params: Any) -> tuple[Method, Function]:
+    def _own_method(self, name: str) -> tuple[Method, Function]:
         if name not in METHODS:
             raise UsageError(f"no method {name[:80]!r}", remedy=f"the station has {', '.join(METHODS)}")
-        if not isinstance(params, dict):
-            raise UsageError(f"{name}: params is no object", remedy="send parameters by their names")
         if len(self._own) >= MAX_PENDING:
             raise Refused("too many requests under way", limit=MAX_PENDING, remedy="wait for answers")
         return METHODS[name]
@@ -193,7 +183,8 @@ class Link:
                 farewell = _farewell(line)
                 self._outbox.put(line)
                 if self._outbox.overfull:
-                    return self._give_up("it does not read its answers")
+                    self._give_up("it does not read its answers")
+                    return None
         except (OSError, ValueError):
             pass  # a broken pipe and an endless line end the connection like a hang-up
         return self._gone(farewell)
@@ -206,7 +197,8 @@ class Link:
                 async with asyncio.timeout(STALLED_S):
                     await self._page.send_frame(line.rstrip(), WSMsgType.TEXT)
             except TimeoutError:
-                return self._give_up("it stopped reading")
+                self._give_up("it stopped reading")
+                return None
             except ConnectionError:
                 return None
 

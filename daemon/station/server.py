@@ -199,11 +199,10 @@ class Station:
     # -- runs ---------------------------------------------------------------------------------------------------------
 
     async def _run_file(self, request: web.Request) -> web.StreamResponse:
-        path = await runs.run_file(*self._run(request), request.match_info["file"])
-        return web.FileResponse(path, headers={"Content-Disposition": "attachment"})
+        return await runs.file(*self._run(request), request.match_info["file"])
 
     async def _run_plot(self, request: web.Request) -> web.StreamResponse:
-        return web.Response(body=await runs.draw(*self._run(request)), content_type="image/png")
+        return await runs.plot(*self._run(request))
 
     def _run(self, request: web.Request) -> tuple[Robot, str]:
         self._role(request)
