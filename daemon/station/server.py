@@ -199,10 +199,11 @@ class Station:
     # -- runs ---------------------------------------------------------------------------------------------------------
 
     async def _run_file(self, request: web.Request) -> web.StreamResponse:
-        return await runs.file(*self._run(request), request.match_info["file"])
+        path = await runs.run_file(*self._run(request), request.match_info["file"])
+        return web.FileResponse(path, headers={"Content-Disposition": "attachment"})
 
     async def _run_plot(self, request: web.Request) -> web.StreamResponse:
-        return await runs.plot(*self._run(request))
+        return web.Response(body=await runs.draw(*self._run(request)), content_type="image/png")
 
     def _run(self, request: web.Request) -> tuple[Robot, str]:
         self._role(request)
