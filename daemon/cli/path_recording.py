@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TextIO
 
@@ -14,17 +13,14 @@ from daemon.cli.motion import signals_interrupt
 from daemon.cli.options import Options
 from daemon.cli.output import say, say_warning, show
 from daemon.loops.odometry import Pose
-from daemon.loops.path import Piece, wrap
-from daemon.loops.path_fitting import deviation, fit_pieces, split_runs
-from daemon.loops.record_smoothing import smoothed
+from daemon.loops.recorded_path import fit_record
+from profiles.path_writing import path_lines
 
 COLUMNS = ("time_s", "x_m", "y_m", "yaw_deg", "trailer_x_m", "trailer_y_m", "trailer_yaw_deg")
 """Of a record; the last three are empty for a vehicle without a trailer."""
 LONGEST_RECORD = 1_000_000
 FARTHEST_M = 1e6
 """Nobody has driven farther from where the daemon began."""
-SLIGHTEST_RAD = 1e-5
-"""An arc that turns less is written as a line."""
 
 
 def record(options: Options, name: str, duration_s: float | None, rate_hz: float) -> int:
@@ -62,14 +58,6 @@ def _row(status: dict[str, Any], begin_s: float) -> list[Any]:
     return [round(status["time_s"] - begin_s, 3), *cells]
 
 
-@dataclass(frozen=True, slots=True)
-class Run:
-    """A part of a record in one driving direction: poses of its reference point, and the pieces that fit them."""
-
-    poses: Sequence[Pose]
-    pieces: Sequence[Piece]
-
-
 def fit(name: str, out: str, tolerance_m: float, json: bool | None) -> int:
     """Make a path file of a record; the exit code.
 
@@ -84,19 +72,18 @@ def fit(name: str, out: str, tolerance_m: float, json: bool | None) -> int:
     """
     if not 1e-4 <= tolerance_m <= 1.0:
         raise UsageError(f"a tolerance of {tolerance_m:g} m makes no sense", remedy="give 0.0001 to 1")
-    runs = [_fitted(*run, tolerance_m) for run in _runs(*_read(name))]
-    if not runs:
+    path = fit_record(*_read(name), tolerance_m)
+    if path is None:
         raise UsageError(f"{name}: the vehicle hardly moved", value=name, remedy="record while it drives")
     with _opened(out, "x") as file:
-        file.writelines(f"{line}\n" for line in _path_lines(name, runs))
-    pieces = [piece for run in runs for piece in run.pieces]
-    off_m = max(deviation(run.poses, run.pieces) for run in runs)
+        file.writelines(f"{line}\n" for line in path_lines(path.spec(), f"Fitted to {Path(name).name}."))
+    off_m = path.deviation_m
     if off_m > tolerance_m:
         say_warning(f"the record scatters by more than the tolerance: a pose lies {off_m:.4f} m beside the path")
     numbers = {
         "file": out,
-        "pieces": len(pieces),
-        "length_m": round(math.fsum(piece.length_m for piece in pieces), 3),
+        "pieces": len(path.pieces),
+        "length_m": round(path.length_m, 3),
         "deviation_m": round(off_m, 5),
     }
     show(numbers, json=json)
@@ -144,36 +131,3 @@ def _pose(cells: Sequence[str]) -> Pose:
     if not (abs(x) <= FARTHEST_M and abs(y) <= FARTHEST_M and math.isfinite(yaw_deg)):
         raise ValueError(cells)
     return Pose(x, y, math.radians(yaw_deg))
-
-
-def _runs(trucks: list[Pose], trailers: list[Pose]) -> Iterator[tuple[bool, list[Pose]]]:
-    for backward, indices in split_runs(trucks):
-        poses = trailers if backward else trucks
-        yield backward, [poses[index] for index in indices]
-
-
-def _fitted(backward: bool, poses: list[Pose], tolerance_m: float) -> Run:
-    return Run(poses, fit_pieces(smoothed(poses, tolerance_m), tolerance_m, backward))
-
-
-def _path_lines(name: str, runs: list[Run]) -> Iterator[str]:
-    """The path file, line by line."""
-    first = runs[0].pieces[0]
-    yield f"# Fitted to {Path(name).name}."
-    heading_deg = math.degrees(wrap(first.heading(0.0)))
-    yield f"start: {{x_m: {first.x_m:.5f}, y_m: {first.y_m:.5f}, heading_deg: {heading_deg:.5f}}}"
-    yield "pieces:"
-    for number, run in enumerate(runs):
-        begin = run.pieces[0]
-        drive = "backward" if begin.backward else "forward"
-        place = f"from_m: [{begin.x_m:.5f}, {begin.y_m:.5f}], " if number else ""
-        yield f"  - {{drive: {drive}, {place}{_shape(begin)}}}"
-        for piece in run.pieces[1:]:
-            yield f"  - {{{_shape(piece)}}}"
-
-
-def _shape(piece: Piece) -> str:
-    turn = piece.curvature * piece.length_m
-    if abs(turn) < SLIGHTEST_RAD:
-        return f"line_m: {piece.length_m:.5f}"
-    return f"arc_deg: {math.degrees(turn):.6f}, radius_m: {1 / abs(piece.curvature):.5f}"

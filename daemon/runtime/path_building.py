@@ -28,6 +28,7 @@ class PathBuilder:
         exchanged: drive backward what the file says is driven forward, and the other way round.
         forward_curvature, backward_curvature: as for :func:`daemon.loops.path.check_piece`.
         from_here: the file says no start; where a joint is wrong, it is told what that means for points.
+        entry: number of the first piece that is added, for errors.
     """
 
     def __init__(
@@ -39,6 +40,7 @@ class PathBuilder:
         backward_curvature: float,
         *,
         from_here: bool = False,
+        entry: int = 0,
     ) -> None:
         self._from_here = from_here
         self._x_m, self._y_m, self._heading_rad = start.x_m, start.y_m, start.yaw_rad
@@ -46,7 +48,17 @@ class PathBuilder:
         self._curvatures = forward_curvature, backward_curvature
         self._backward = exchanged
         self._path: Path | None = None
-        self._entries = 0
+        self._entries = entry
+
+    @property
+    def end(self) -> Pose:
+        """Where the next piece begins, with the vehicle's heading."""
+        return Pose(self._x_m, self._y_m, self._heading_rad)
+
+    @property
+    def backward(self) -> bool:
+        """Driving direction of the last piece."""
+        return self._backward
 
     def add(self, spec: PieceSpec) -> None:
         """Add one piece of the file.
