@@ -26,6 +26,7 @@ const BRAKE_STATES = {
   releasing: ["warn", "releasing"],
   unknown: ["warn", "unknown"],
 };
+const LAST = "the last before it was lost";
 const CURRENT_LIMIT = "continuous_current_limit";
 
 /** Kind of badge and words of a node's state in its boot-up; whatever else it is called stays as it is. */
@@ -97,6 +98,7 @@ export class DriveCard {
     setBadge(this.head.state, ...(ready ? DRIVE_STATES[node.state] ?? ["warn", node.state] : nodeState(node.node_state)));
     this.#trouble.show(node);
     this.#facts.show({
+      Values: ready ? null : LAST,
       Mode: node.mode,
       Velocity: `${number(node.velocity_rpm, 0)} rpm`,
       Speed: `${number(node.speed_m_s, 3)} m/s`,
@@ -187,6 +189,7 @@ export function encoderCard(node) {
     setBadge(top.state, ...nodeState(now.node_state));
     wrong.show(now);
     facts.show({
+      Values: now.node_state === "ready" ? null : LAST,
       Heading: `${number(now.heading_deg, 2)}°`,
       Sensed: now.sensed_deg == null ? null : `${number(now.sensed_deg, 2)}°`,
       Position: now.position_counts == null ? null : `${now.position_counts} counts`,

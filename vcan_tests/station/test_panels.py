@@ -1,0 +1,216 @@
+"""Devices, events, objects and the simulation on the page."""
+
+from __future__ import annotations
+
+import pytest
+
+from vcan_tests.station.browser import Operator
+from vcan_tests.station.processes import Robot, Status, at_rest, speeds
+
+pytestmark = pytest.mark.station
+
+ROBOTS = ("max2d",)
+DRIVE = "front_left"
+LEASE_S = 1.5
+SLOW_RPM = 100.0
+CARD = f"article[aria-label='Drive {DRIVE}']"
+FORWARD = f"{CARD} button.hold:last-of-type"
+OBJECTS, SIMULATION = "[data-panel=objects]", "[data-panel=simulation]"
+RAMP = "0x6083"
+
+
+def turning(status: Status) -> bool:
+    """Whether the drive turns as fast as a jog asks for at first."""
+    node = next(node for node in status["nodes"] if node["name"] == DRIVE)
+    return bool(node["velocity_rpm"] > 0.8 * SLOW_RPM)
+
+
+def jogs(operator: Operator, robot: Robot) -> None:
+    """Press the button that turns the motor, and wait until it turns."""
+    operator.go_to("devices")
+    operator.page.locator(FORWARD).scroll_into_view_if_needed()
+    operator.page.hover(FORWARD)
+    operator.page.mouse.down()
+    robot.comes_to(turning, within_s=5.0)
+
+
+def test_a_drive_is_enabled_and_disabled_from_its_card(operator: Operator, robot: Robot) -> None:
+    operator.go_to("devices")
+    operator.page.click(f"{CARD} >> text=Enable")
+    operator.sees(CARD, "enabled: power stage on")
+    assert [node["name"] for node in robot.status()["nodes"] if node.get("state") == "enabled"] == [DRIVE]
+    operator.page.click(f"{CARD} >> text=Disable")
+    operator.sees(CARD, "disabled: power stage off")
+
+
+def test_a_motor_turns_as_long_as_its_button_is_held(operator: Operator, robot: Robot) -> None:
+    jogs(operator, robot)
+    operator.page.mouse.up()
+    robot.comes_to_rest(within_s=2.0)
+
+
+def test_a_motor_that_is_jogged_stops_when_the_page_is_gone(operator: Operator, robot: Robot) -> None:
+    jogs(operator, robot)
+    operator.page.close()
+    robot.comes_to_rest(within_s=LEASE_S + 1.0)
+
+
+def test_a_motor_that_is_jogged_by_a_key_stops_when_the_focus_goes_elsewhere(operator: Operator, robot: Robot) -> None:
+    operator.go_to("devices")
+    operator.page.focus(FORWARD)
+    operator.page.keyboard.down("Enter")
+    robot.comes_to(turning, within_s=5.0)
+    operator.page.focus("#robot")
+    robot.comes_to_rest(within_s=2.0)
+    operator.page.keyboard.up("Enter")
+
+
+def test_a_jog_that_is_too_fast_is_refused_in_words(operator: Operator, robot: Robot) -> None:
+    operator.go_to("devices")
+    operator.page.fill(f"{CARD} input[type=number]", "90000")
+    operator.page.hover(FORWARD)
+    operator.page.mouse.down()
+    operator.sees("#alarms", "beyond the limit of front_left.*ask for less")
+    operator.page.mouse.up()
+    assert at_rest(robot.status())
+
+
+def test_the_statusword_is_told_in_words_where_somebody_asks(operator: Operator) -> None:
+    operator.go_to("devices")
+    operator.page.click(f"{CARD} summary")
+    operator.sees(f"{CARD} details", "statusword 0x1140: switch on disabled")
+
+
+def test_a_fault_is_told_with_its_cure_and_counted_on_the_tab(
+    operator: Operator, robot: Robot, expected_errors: list[str]
+) -> None:
+    expected_errors.append("over-temperature")
+    operator.go_to("devices")
+    robot.call("simulation.fault", kind="emcy", part=DRIVE, code=0x4210)
+    operator.sees(CARD, "over-temperature.*what to do: let it cool down")
+    operator.until(
+        lambda: "new warnings or errors" in (operator.page.get_attribute("[data-tab=events]", "aria-label") or ""),
+        lambda: "the tab tells of nothing new",
+    )
+    operator.go_to("events")
+    operator.sees("ol.events", r"error\s+max2d: front_left\s+.*over-temperature")
+    assert operator.page.get_attribute("[data-tab=events]", "data-unread") is None
+
+
+def test_a_node_without_power_is_told_as_lost_and_its_values_as_old(
+    operator: Operator, robot: Robot, expected_errors: list[str]
+) -> None:
+    expected_errors.append("is lost")
+    operator.go_to("simulation")
+    operator.page.click(f"button[aria-label='Off: power of {DRIVE}']")
+    operator.go_to("devices")
+    operator.sees(CARD, "lost: not heard")
+    operator.sees(CARD, "the last before it was lost")
+    assert operator.page.is_disabled(FORWARD)
+    operator.go_to("simulation")
+    operator.page.click(f"button[aria-label='On: power of {DRIVE}']")
+    operator.go_to("devices")
+    operator.sees(CARD, "disabled: power stage off")
+
+
+def test_events_are_filtered_by_words(operator: Operator) -> None:
+    operator.go_to("events")
+    operator.sees("[data-panel=events]", "configured, started and guarded")
+    operator.page.fill("[data-panel=events] input[type=search]", "no such words")
+    operator.sees("[data-panel=events]", "^(?!.*configured)(?s:.)*0 of")
+
+
+def test_events_of_an_earlier_connection_are_kept_once(operator: Operator) -> None:
+    operator.go_to("events")
+    operator.sees("[data-panel=events]", "configured, started and guarded")
+    before = operator.page.locator("ol.events li").count()
+    operator.page.evaluate(
+        "import('/page/station.js').then(({station}) => (station.choose(null), station.choose('max2d')))"
+    )
+    operator.sees("#connection", "connected")
+    operator.page.wait_for_function("import('/page/station.js').then(({station}) => station.status !== null)")
+    assert operator.page.locator("ol.events li").count() == before
+
+
+def chooses(operator: Operator, words: str) -> None:
+    """Search an object, and choose the first that is found."""
+    operator.go_to("objects")
+    operator.page.select_option(f"{OBJECTS} select", DRIVE)
+    operator.page.fill(f"{OBJECTS} input[type=search]", words)
+    operator.page.click(f"{OBJECTS} tbody button >> nth=0")
+
+
+def test_an_object_is_found_by_its_name_and_read(operator: Operator, robot: Robot) -> None:
+    chooses(operator, "profile acceleration")
+    operator.sees(f"{OBJECTS} .value", f"{robot.call('sdo.read', node=DRIVE, object=RAMP)['value']} rpm/s")
+
+
+def test_an_object_that_can_only_be_read_has_no_field_for_a_value(operator: Operator) -> None:
+    chooses(operator, "statusword")
+    operator.sees(f"{OBJECTS} .value", "switch on disabled")
+    assert not operator.page.is_visible(f"{OBJECTS} form")
+
+
+def test_an_object_is_written_when_old_and_new_value_were_seen(operator: Operator, robot: Robot) -> None:
+    old = robot.call("sdo.read", node=DRIVE, object=RAMP)["value"]
+    chooses(operator, RAMP)
+    operator.page.fill(f"{OBJECTS} form input", "1234")
+    operator.page.keyboard.press("Enter")
+    operator.sees(f"{OBJECTS} .question", f"is {old} rpm/s.*Write 1234 rpm/s")
+    assert robot.call("sdo.read", node=DRIVE, object=RAMP)["value"] == old
+    operator.page.click("text=Write it")
+    operator.sees(f"{OBJECTS} [role=status].value", "Written: 1234")
+    assert robot.call("sdo.read", node=DRIVE, object=RAMP)["value"] == 1234
+    robot.call("sdo.write", node=DRIVE, object=RAMP, value=old)
+
+
+def test_a_value_that_does_not_fit_is_refused_in_the_daemons_words(operator: Operator) -> None:
+    chooses(operator, RAMP)
+    operator.page.fill(f"{OBJECTS} form input", "fast")
+    operator.page.keyboard.press("Enter")
+    operator.page.click("text=Write it")
+    operator.sees(f"{OBJECTS} [role=status].value", "'fast' is no whole number.*takes a whole number")
+
+
+def test_all_wheels_are_put_on_ice_and_back(operator: Operator, robot: Robot) -> None:
+    operator.go_to("simulation")
+    operator.page.click("text=All wheels on ice")
+    operator.sees(SIMULATION, "Take the ice from rear_left")
+    faults = robot.call("simulation.faults")["faults"]
+    assert {(fault["kind"], fault["friction"]) for fault in faults} == {("ice", 0.02)}
+    assert {fault["part"] for fault in faults} == {"front_left", "front_right", "rear_left", "rear_right"}
+    operator.page.click("text=Take all ice away")
+    operator.sees(SIMULATION, "No fault is set")
+    assert robot.call("simulation.faults")["faults"] == []
+
+
+def test_a_kind_of_fault_is_asked_for_what_it_takes_alone(operator: Operator, robot: Robot) -> None:
+    operator.go_to("simulation")
+    form = f"{SIMULATION} form.fault-form"
+    operator.page.select_option(f"{form} select >> nth=0", "ice")
+    labels = operator.page.locator(f"{form} .field label").all_text_contents()
+    assert [label.split()[0] for label in labels] == ["part", "friction", "for", "at", "at"]
+    operator.page.select_option(f"{form} select >> nth=0", "encoder_jump")
+    operator.page.select_option(f"{form} select >> nth=1", "front")
+    operator.page.fill(f"{form} input >> nth=0", "1")
+    operator.page.click("text=Set this fault")
+    operator.sees(SIMULATION, "encoder_jump")
+    (fault,) = robot.call("simulation.faults")["faults"]
+    assert (fault["kind"], fault["part"], fault["angle_deg"]) == ("encoder_jump", "front", 1.0)
+
+
+def test_the_robot_is_put_onto_blocks(operator: Operator, robot: Robot) -> None:
+    operator.go_to("simulation")
+    operator.page.click("text=Put onto blocks")
+    operator.sees(SIMULATION, "its wheels in the air")
+    assert robot.call("simulation.look")["lifted"] is True
+    operator.page.click("text=Put down")
+    operator.sees(SIMULATION, "It stands on the floor")
+
+
+def test_a_slope_rolls_a_robot_that_nobody_holds(operator: Operator, robot: Robot) -> None:
+    operator.go_to("simulation")
+    operator.page.fill(f"{SIMULATION} form[aria-label=Slope] input >> nth=0", "15")
+    operator.page.click(f"{SIMULATION} >> text=Tilt")
+    robot.comes_to(lambda status: max(speeds(status)) > 0.02, within_s=10.0)
+    operator.page.click("text=Make level")
