@@ -80,9 +80,10 @@ function showConnection(station) {
   text(element("stale"), `Stale: nothing heard for ${ageWords(station)}. All values are old, and nothing can be moved.`);
 }
 
-function connectionWords({ robot, connected, stale, reason, age_s }) {
+function connectionWords({ robot, connected, stale, status, reason, age_s }) {
   if (!robot) return "no robot chosen";
   if (!connected) return reason ? `reconnecting: ${reason}` : "connecting";
+  if (!status) return "connected, no word yet";
   return stale ? `stale since ${ageWords({ age_s })}` : "connected";
 }
 

@@ -15,13 +15,15 @@ export function watchLogin(station) {
     setTimeout(look, PERIOD_MS);
   };
   look();
+  document.getElementById("logout").addEventListener("click", () => logOut(station));
 }
 
 async function lookForRobots(station) {
   try {
-    const session = await fetched("session");
-    showLogin(session.login_needed && !session.role);
-    if (session.login_needed && !session.role) return;
+    const { login_needed, role } = await fetched("session");
+    document.getElementById("logout").hidden = !login_needed || !role;
+    showLogin(login_needed && !role);
+    if (login_needed && !role) return;
     offer(station, (await fetched("robots")).robots);
   } catch {
     // the station does not answer: the connection tells so
@@ -84,6 +86,13 @@ function form(section) {
     h("p", {}, "This control station asks for a token. Whoever has set it up gives you one."),
     asking,
   ];
+}
+
+/** Forget the token; what this page moves comes to rest with its connection. */
+async function logOut(station) {
+  station.choose(null);
+  await station.attempt(fetch("logout", { method: "POST" }), "logging out");
+  showLogin(true);
 }
 
 /** What went wrong, for people; empty where the login is done. */

@@ -2,7 +2,12 @@
 
 const RANK = ["stop", "watch", "drive", "configure"];
 /** Methods of the station itself that change something. */
-const STATION_ROLES = { "station.path.write": "drive", "station.path.delete": "drive" };
+const STATION_ROLES = {
+  "station.path.write": "drive",
+  "station.path.delete": "drive",
+  "station.record.start": "drive",
+  "station.record.stop": "drive",
+};
 /** Methods that not every vehicle has, and what a vehicle without them does not do. */
 const NOT_OF_ALL = {
   steer: "has no wheel pairs that are steered one by one",

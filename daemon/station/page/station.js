@@ -11,6 +11,7 @@ const LOOK_MS = 200;
 class Station {
   #listeners = new Map();
   #connection = null;
+  #told_ms = -Infinity;
 
   constructor() {
     /** Name of the chosen robot. */
@@ -52,9 +53,9 @@ class Station {
     return this.status?.role ?? this.hello?.role ?? null;
   }
 
-  /** Age of the newest word from the robot in seconds. */
+  /** Age of the newest status in seconds. */
   get age_s() {
-    return this.#connection ? (performance.now() - this.#connection.lastHeard_ms) / 1000 : Infinity;
+    return (performance.now() - this.#told_ms) / 1000;
   }
 
   /** Whether a message would leave this page now, be it never answered. */
@@ -160,6 +161,7 @@ class Station {
 
   #took(status) {
     this.status = status;
+    this.#told_ms = performance.now();
     this.#lookAtAge();
     this.#emit("status", status);
   }
