@@ -27,6 +27,7 @@ export class PathFiles {
     this.element = this.#fieldset();
     station.on("connected", () => this.#connected());
     station.on("robot", () => this.#forget());
+    addEventListener("hashchange", () => location.hash === "#paths" && station.connected && this.#list());
   }
 
   #button(title, act) {

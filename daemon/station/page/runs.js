@@ -1,12 +1,12 @@
 /** The panel of runs: what motions and faults have left, with pictures and downloads. */
 
-import { allow, attribute, h, number, text } from "./dom.js";
+import { allow, attribute, h, number, redraw, text } from "./dom.js";
 import { Rows, table } from "./rows.js";
 
 const HEADS = ["Run", "Begun", "What", "How it ended", "Duration", "Files"];
 const WANTED = "run-wanted";
 
-/** Open the newest run in its panel, once that is shown. */
+/** Open the newest run as soon as the panel is shown and has read which one that is. */
 export function openNewestRun() {
   document.dispatchEvent(new Event(WANTED));
 }
@@ -20,16 +20,19 @@ class RunsPanel {
   #rows;
   #chosen = null;
   #asked = 0;
+  #wanted = false;
 
   constructor(station) {
     this.station = station;
     this.#make();
     station.on("connected", () => station.connected && this.#seen() && this.reload());
     station.on("robot", () => this.#forget());
-    station.on("connected", () => this.#show());
-    document.addEventListener(WANTED, () => this.#openNewest());
+    const show = redraw(this.element, () => this.#show());
+    for (const kind of ["connected", "status", "stale"]) station.on(kind, show);
+    document.addEventListener(WANTED, () => {
+      this.#wanted = true;
+    });
     addEventListener("hashchange", () => location.hash === "#runs" && this.reload());
-    if (location.hash === "#runs") station.on("shape", () => this.#seen() && this.reload());
   }
 
   #make() {
@@ -64,20 +67,16 @@ class RunsPanel {
     text(this.told, "");
   }
 
-  /** Read the list of runs anew; returns them, the newest first. */
+  /** Read the list of runs anew; open the newest, if that is wanted. */
   async reload() {
     const asked = ++this.#asked;
     const answer = await this.station.attempt(this.station.call("station.runs", {}, { timeout_ms: 15_000 }), "Runs");
-    if (!answer || asked !== this.#asked) return [];
-    const runs = [...answer.runs].sort((one, other) => String(other.begun).localeCompare(String(one.begun)));
+    if (!answer || asked !== this.#asked) return;
+    const runs = answer.runs.toReversed();
     this.#rows.show(runs);
     text(this.told, runs.length ? `${runs.length} runs` : "No runs yet: every motion leaves one.");
-    return runs;
-  }
-
-  async #openNewest() {
-    const [newest] = await this.reload();
-    if (newest) this.#open(newest);
+    if (this.#wanted && runs.length) this.#open(runs[0]);
+    this.#wanted = false;
   }
 
   // --- one run --------------------------------------------------------------------------------------------------
@@ -91,11 +90,11 @@ class RunsPanel {
     return { element, show: (now) => this.#fill(element, cells, now) };
   }
 
-  #fill(element, cells, { run, begun, method, ended, duration_s, files }) {
+  #fill(element, cells, { run, begun, method, ended, message, duration_s, files }) {
     attribute(element, "data-chosen", run === this.#chosen);
-    text(cells.begun, begun);
+    text(cells.begun, begun ? new Date(begun).toLocaleString() : "–");
     text(cells.method, method);
-    text(cells.ended, ended ?? "under way");
+    text(cells.ended, [ended ?? "under way", message].filter(Boolean).join(": "));
     text(cells.duration, duration_s == null ? "–" : `${number(duration_s, 1)} s`);
     if (cells.files.childElementCount !== files.length) cells.files.replaceChildren(this.#links(run, files));
   }
