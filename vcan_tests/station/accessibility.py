@@ -8,16 +8,22 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-RUN = """async () => {
-    const found = await axe.run(document, {resultTypes: ["violations"], rules: {"target-size": {enabled: true}}});
+RUN = """async only => {
+    const rules = only.length ? {runOnly: only} : {rules: {"target-size": {enabled: true}}};
+    const found = await axe.run(document, {resultTypes: ["violations"], ...rules});
     return found.violations.flatMap(rule => rule.nodes.map(node => `${rule.id}: ${node.target.join(" ")}: ` +
         [...node.any, ...node.all, ...node.none].map(check => check.message).join("; ")));
 }"""
 
 
-def findings(page: Page) -> list[str]:
-    """What is wrong for people with a screen reader, without colours, without a mouse; each with its element."""
+def findings(page: Page, *only: str) -> list[str]:
+    """What is wrong for people with a screen reader, without colours, without a mouse; each with its element.
+
+    Args:
+        page: that is looked at.
+        only: rules of axe-core; all where none is named.
+    """
     if not page.evaluate("() => 'axe' in window"):
         page.evaluate(files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8"))
-    found: list[str] = page.evaluate(RUN)
+    found: list[str] = page.evaluate(RUN, only)
     return found

@@ -150,7 +150,7 @@ TRESPASS = """async host => {
 
 def test_a_foreign_page_in_the_same_browser_gets_nothing(meet: Meet, fleet: Fleet, elsewhere: str) -> None:
     operator = meet(elsewhere)
-    operator.expects("403", "CORS", "WebSocket", "frame", "leaves the station", "failed: ")
+    operator.expects("403", "CORS", "WebSocket", "frame", "leaves the station", "failed: ", "ERR_FAILED")
     operator.open()
     host = fleet.station.url.removeprefix("http://").rstrip("/")
     assert operator.page.evaluate(TRESPASS, host)[:2] == ["refused", "refused"]
@@ -206,7 +206,10 @@ def test_a_forged_request_of_a_watcher_is_refused_by_the_station(
     assert at_rest(robot.status())
 
 
-def test_a_watcher_may_stop_the_robot(meet: Meet, guarded: Station, robot: Robot) -> None:
+def test_a_watcher_may_stop_the_robot(
+    meet: Meet, guarded: Station, robot: Robot, expected_errors: list[str]
+) -> None:
+    expected_errors.append("emergency stop")
     operator = log_in(meet, guarded, TOKENS["watch"])
     operator.choose("max2d")
     request = {"jsonrpc": "2.0", "id": 78, "method": "estop", "params": {}}

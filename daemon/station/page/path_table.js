@@ -32,6 +32,7 @@ export class PathTable {
   }
 
   show() {
+    this.element.hidden = !this.editor.entries.length;
     this.#rows.show(this.editor.entries.map((entry, index) => ({ index, entry })));
   }
 
