@@ -8,6 +8,7 @@ export const SPAN_S = 60;
 const CAPACITY = 2048;
 const GAP_S = 0.5;
 const TICK_S = 10;
+const LEGEND_PX = 14;
 const MARGIN = { left: 46, right: 8, top: 8, bottom: 20 };
 const ROWS = 4;
 const SPARE = 1.1;
@@ -51,6 +52,7 @@ export class Chart {
   #ring;
   #now_s = null;
   #limit = null;
+  #surface;
 
   /**
    * @param station for whether values are stale.
@@ -67,8 +69,6 @@ export class Chart {
     this.#surface = sharp(this.canvas, this.changed);
     station.on("stale", this.changed);
   }
-
-  #surface;
 
   /** Take the values of a moment; null where there is none. A clock that goes back begins anew. */
   add(time_s, values, limit = null) {
@@ -109,6 +109,7 @@ export class Chart {
     const now_s = this.#now_s;
     if (now_s === null) return;
     this.names.forEach((_, series) => this.#drawSeries(context, colours, frame, series, now_s - SPAN_S));
+    if (this.names.length > 1) this.#drawLegend(context, colours, frame);
   }
 
   /** Where times and values are on the canvas; the values' axis has zero in its middle. */
@@ -164,10 +165,27 @@ export class Chart {
     context.fillText(beyond ? `▼ ${name}` : name, left + 4, low - 2);
   }
 
-  #drawSeries(context, colours, { x, y }, series, from_s) {
+  #drawLegend(context, colours, { left, top }) {
+    [context.textAlign, context.textBaseline] = ["left", "middle"];
+    this.names.forEach((name, series) => {
+      const [x, y] = [left + 6, top + 8 + series * LEGEND_PX];
+      this.#style(context, colours, series);
+      rule(context, [x, y], [x + 26, y]);
+      context.fillStyle = colours.ink;
+      context.fillText(name, x + 32, y);
+    });
+    context.setLineDash([]);
+  }
+
+  /** Colour and dashes tell a series, not the colour alone. */
+  #style(context, colours, series) {
     context.strokeStyle = this.station.stale ? colours.muted : colours.series[series];
     context.lineWidth = 2;
     context.setLineDash(DASHES[series]);
+  }
+
+  #drawSeries(context, colours, { x, y }, series, from_s) {
+    this.#style(context, colours, series);
     context.beginPath();
     let before_s = -Infinity;
     this.#ring.each(series, from_s, (time_s, value) => {

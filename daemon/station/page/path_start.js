@@ -20,7 +20,7 @@ export class StartFields {
     const labelled = ([name, input]) => h("label", { class: "field" }, named[name], input);
     const fields = Object.entries(this.fields).map(labelled);
     const tick = h("label", { class: "tick", for: "path-here" }, this.here, "Begin where the vehicle is");
-    this.element = h("fieldset", {}, h("legend", {}, "Start"), h("div", { class: "row bottom" }, tick, ...fields));
+    this.element = h("fieldset", {}, h("legend", {}, "Start"), tick, h("div", { class: "row bottom" }, ...fields));
   }
 
   #toggle() {
