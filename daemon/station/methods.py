@@ -49,6 +49,10 @@ _METHODS: Final[tuple[tuple[Method, Function], ...]] = (
         paths.write_path,
     ),
     (Method("station.path.delete", "Delete a path for good.", (_NAME,), "name"), paths.delete_path),
+    (
+        Method("station.record", "Whether the way of the vehicle is noted.", (), "recording, poses", Role.WATCH),
+        recording.look,
+    ),
     (Method("station.record.start", "Note where the vehicle goes.", (), "recording"), recording.start),
     (
         Method(

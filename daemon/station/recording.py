@@ -44,38 +44,40 @@ class Recording:
         self.poses: list[tuple[Pose, Pose]] = []
         self.trouble: CanhelmError | None = None
         self._robot = robot
+        self._client = Client(robot.socket)
+        self._beginning = asyncio.Lock()
         self._task: asyncio.Task[None] | None = None
 
     async def begin(self) -> None:
         """Connect to the daemon. Raises CanhelmError; Refused where the vehicle does not know where it is."""
-        client = Client(self._robot.socket)
-        await client.connect()
-        try:
-            self._note((await client.status())["vehicle"])
-        except BaseException:
-            await client.close()
-            raise
-        self._task = asyncio.create_task(self._listen(client), name=f"recording of {self._robot.name}")
+        async with self._beginning:
+            await self._client.connect()
+            try:
+                self.note((await self._client.status())["vehicle"])
+            except BaseException:
+                await self._client.close()
+                raise
+            self._task = asyncio.create_task(self._listen(), name=f"recording of {self._robot.name}")
 
     async def end(self) -> None:
         """Note nothing more."""
-        if self._task is not None:
-            self._task.cancel()
-            await asyncio.wait([self._task])
+        async with self._beginning:
+            if self._task is not None:
+                self._task.cancel()
+                await asyncio.wait([self._task])
+                await self._client.close()
 
-    async def _listen(self, client: Client) -> None:
+    async def _listen(self) -> None:
         try:
-            async with aclosing(client.notifications(RATE_HZ)) as notifications:
+            async with aclosing(self._client.notifications(RATE_HZ)) as notifications:
                 async for kind, status in notifications:
                     if kind == "status":
-                        self._note(status["vehicle"])
+                        self.note(status["vehicle"])
         except CanhelmError as error:
             self.trouble = error
-        finally:
-            await client.close()
 
-    def _note(self, vehicle: Mapping[str, Any]) -> None:
-        """Where it is, unless it is there still. Raises Refused, LimitExceeded."""
+    def note(self, vehicle: Mapping[str, Any]) -> None:
+        """Take where it is, unless it is there still. Raises Refused where it does not know that."""
         pose = vehicle.get("pose")
         if pose is None:
             raise Refused("this vehicle does not know where it is", remedy="record one that has an odometry")
@@ -83,21 +85,30 @@ class Recording:
         if self.poses and not _apart(self.poses[-1][0], body):
             return
         if len(self.poses) >= MAX_POSES:
-            raise LimitExceeded("the recorded way is full", limit=MAX_POSES, remedy="end it, and record in parts")
+            what = "the recorded way is as long as one may be"
+            self.trouble = LimitExceeded(what, limit=MAX_POSES, remedy="record in parts")
+            return
         trailer = vehicle.get("trailer")
         self.poses.append((body, _pose(trailer) if trailer else body))
 
 
 async def start(robot: Robot, params: dict[str, Any]) -> dict[str, Any]:
     """Note where the vehicle goes; a recording that is under way already goes on. Raises CanhelmError."""
-    under_way = _UNDER_WAY.get(robot.name)
-    if under_way is None:
-        under_way = Recording(robot)
-        await under_way.begin()
-        if robot.name in _UNDER_WAY:  # another page was faster
-            await under_way.end()
-        under_way = _UNDER_WAY.setdefault(robot.name, under_way)
-    return {"recording": True, "poses": len(under_way.poses)}
+    recording = _UNDER_WAY.get(robot.name)
+    if recording is None:
+        recording = _UNDER_WAY[robot.name] = Recording(robot)
+        try:
+            await recording.begin()
+        except BaseException:
+            _UNDER_WAY.pop(robot.name, None)
+            raise
+    return {"recording": True, "poses": len(recording.poses)}
+
+
+async def look(robot: Robot, params: dict[str, Any]) -> dict[str, Any]:
+    """Whether the way is being noted: a page that comes back goes on with it."""
+    recording = _UNDER_WAY.get(robot.name)
+    return {"recording": recording is not None, "poses": len(recording.poses) if recording else 0}
 
 
 async def stop(robot: Robot, params: dict[str, Any]) -> dict[str, Any]:
@@ -124,7 +135,7 @@ async def stop(robot: Robot, params: dict[str, Any]) -> dict[str, Any]:
 
 
 def _fitted(recording: Recording) -> RecordedPath:
-    bodies, trailers = zip(*recording.poses, strict=True)
+    bodies, trailers = [body for body, _ in recording.poses], [trailer for _, trailer in recording.poses]
     path = fit_record(bodies, trailers, TOLERANCE_M)
     if path is not None:
         return path

@@ -65,8 +65,11 @@ export class PathFiles {
   // --- kept paths -----------------------------------------------------------------------------------------------
 
   #connected() {
-    if (this.station.connected) this.#list();
-    else this.#recording = false;
+    this.#recording = false;
+    if (this.station.connected) {
+      this.#list();
+      this.#askRecording();
+    }
     this.show();
   }
 
@@ -151,6 +154,13 @@ export class PathFiles {
   }
 
   // --- recording ------------------------------------------------------------------------------------------------
+
+  /** A recording goes on while pages come and go. */
+  async #askRecording() {
+    const answer = await this.station.call("station.record").catch(() => null);
+    this.#recording = Boolean(answer?.recording);
+    this.show();
+  }
 
   async #record() {
     if (this.#recording) await this.#endRecording();
