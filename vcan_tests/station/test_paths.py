@@ -152,7 +152,7 @@ def test_a_path_is_deleted_only_when_somebody_says_so(drawer: Operator, fleet: F
     drawer.page.get_by_label("Name").fill("old")
     press(drawer, "Save")
     drawer.sees(PANEL, "old is saved")
-    drawer.page.locator(f"{PANEL} select").last.select_option("old")
+    drawer.page.select_option("#path-kept", "old")
     press(drawer, "Delete")
     kept = Path(fleet.folder, "state/canhelm", robot.name, "paths", "old.yaml")
     assert kept.exists()
@@ -220,5 +220,5 @@ def test_a_run_shows_its_picture_and_is_downloaded(operator: Operator, robot: Ro
     operator.page.wait_for_selector(f"{runs} img.run-picture", state="visible", timeout=30_000)
     operator.page.locator(f"{runs} tbody summary").first.click()
     with operator.page.expect_download() as download:
-        operator.page.locator(f"{runs} a[download]", has_text="motion.json").first.click()
+        operator.page.locator(f"{runs} a[download]", has_text="run.yaml").first.click()
     assert "drive.path" in Path(download.value.path()).read_text()
