@@ -11,7 +11,7 @@ export class PathFiles {
 
   constructor(station, editor) {
     [this.station, this.editor] = [station, editor];
-    this.select = h("select", { onchange: () => this.show() });
+    this.select = h("select", { id: "path-kept", onchange: () => this.show() });
     this.name = h("input", { type: "text", pattern: NAME, maxlength: 60, oninput: () => this.show() });
     this.file = h("input", { type: "file", accept: ".json", hidden: true, onchange: () => this.#import() });
     this.question = new Question("Confirm");
