@@ -76,6 +76,7 @@ function showConnection(station) {
   attribute(document.body, "data-stale", station.stale ? "true" : null);
   attribute(element("connection"), "data-connection", station.stale ? "bad" : "good");
   text(element("connection"), connectionWords(station));
+  text(element("connection-told"), station.stale ? "values are stale" : "connected");
   element("stale").hidden = !station.stale || !station.status;
   text(element("stale"), `Stale: nothing heard for ${ageWords(station)}. All values are old, and nothing can be moved.`);
 }

@@ -38,7 +38,7 @@ class Row {
   show() {
     const reason = this.#station.cannot(this.#method);
     allow(this.#button, reason);
-    text(this.#reason, reason ? `Not now: ${reason}` : "");
+    text(this.#reason, reason);
     this.#reason.hidden = !reason;
   }
 

@@ -2,9 +2,9 @@
 
 import { h } from "./dom.js";
 
-const SHOWN_MS = { info: 5000, warning: 12000, error: 30000 };
+const SHOWN_MS = { info: 5000, warning: 12000, error: 20000 };
 const WORDS = { info: "Note", warning: "Warning", error: "Error" };
-const MOST = 4;
+const MOST = 3;
 
 /** Show what `station.say` tells, from now on. */
 export function showNotices(station) {

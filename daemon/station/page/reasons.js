@@ -50,10 +50,10 @@ function reasonOfRole(station, method, needed = "watch") {
 }
 
 function reasonOfVehicle({ status, shape }, method) {
-  if (method in NOT_OF_ALL && !status?.vehicle?.methods?.includes(method)) {
-    return `this vehicle ${NOT_OF_ALL[method]}`;
-  }
-  if (method.startsWith("brake.") && !status?.brakes?.length) return "this vehicle has no brakes";
+  const cannotTurn = method === "drive.rotate" && shape?.stream?.yaw_rate === false;
+  const lacks = cannotTurn || !status.vehicle.methods.includes(method);
+  if (method in NOT_OF_ALL && lacks) return `this vehicle ${NOT_OF_ALL[method]}`;
+  if (method.startsWith("brake.") && !status.brakes.length) return "this vehicle has no brakes";
   if (method.startsWith("simulation.") && shape && !shape.simulated) return "this robot is no simulation";
   return null;
 }
@@ -63,8 +63,8 @@ function moves(method, told) {
   return Boolean(told?.needs_lease) || method === "brake.release" || method === "motor.enable";
 }
 
-function reasonOfState({ status, stale, age_s, holds }, method, told) {
-  if (stale) return `the values are stale: nothing heard for ${age_s.toFixed(0)} s`;
+function reasonOfState({ status, stale, holds }, method, told) {
+  if (stale) return "the values are stale: nothing is heard from the robot";
   const { state, message, holder } = status;
   if (state in STANDING) return STANDING[state];
   if (method in NOT_OF_ALL && (state === "waiting" || state === "booting")) return message || `the vehicle is ${state}`;
