@@ -10,6 +10,7 @@ from pathlib import Path
 
 from canhelm.errors import CanhelmError, Refused
 from daemon.app import App
+from daemon.runtime.clock import outside_s
 from daemon.runtime.notify import ServiceManager
 from daemon.runtime.stopping import OFF
 from daemon.runtime.vehicle import VehicleState
@@ -131,7 +132,7 @@ class Life:
     async def _run_app(self, app: App) -> tuple[Drive, ...]:
         manager = self._manager
         manager.sentence = lambda: app.service.sentence
-        app.cycle.on_good = manager.good_cycle
+        app.cycle.on_good = lambda _: manager.good_cycle(outside_s())
         self._keep(app.profile)
         try:
             await app.start()

@@ -15,6 +15,7 @@ from daemon.api.metering import BYTES_PER_S, REQUESTS_PER_S, Meter
 from daemon.api.methods import METHODS, NOTIFICATIONS
 from daemon.api.parameters import Method, validate
 from daemon.api.peers import Peer
+from daemon.runtime.clock import outside_s, pace
 
 if TYPE_CHECKING:
     from daemon.api.server import Server
@@ -54,7 +55,7 @@ class Connection(asyncio.Protocol):
         self.subscribed = False
         self.crowded = False
         self._server = server
-        self._heard_s = asyncio.get_running_loop().time()
+        self._heard_s = outside_s()
         self._transport: asyncio.Transport | None = None
         self._known = peer is not None
         self._peer = peer or Peer.nobody()
@@ -127,7 +128,7 @@ class Connection(asyncio.Protocol):
         """How long nothing was heard of it; 0 while it subscribes or waits for an answer."""
         if self.subscribed or self._pending:
             return 0.0
-        return asyncio.get_running_loop().time() - self._heard_s
+        return outside_s() - self._heard_s
 
     def _drop(self, reason: str) -> None:
         if self._transport is not None:
@@ -140,7 +141,7 @@ class Connection(asyncio.Protocol):
         if self._deaf:
             return
         self._received += data
-        self._heard_s = asyncio.get_running_loop().time()
+        self._heard_s = outside_s()
         if not self._handling:
             self._handle_lines()
 
@@ -156,7 +157,7 @@ class Connection(asyncio.Protocol):
                 return
             line = bytes(self._received[:end])
             message = protocol.parse_message(line)
-            wait_s = 0.0 if _stops(message) else self._meter.wait_s(end, asyncio.get_running_loop().time())
+            wait_s = 0.0 if _stops(message) else self._meter.wait_s(end, outside_s())
             if wait_s and len(self._received) == end + 1:  # it waits for its answers: this one comes later
                 self._go_on_later(wait_s)
                 return
@@ -171,7 +172,7 @@ class Connection(asyncio.Protocol):
         if self._transport is not None:
             self._handling = True
             self._transport.pause_reading()
-            asyncio.get_running_loop().call_later(pause_s, self._handle_lines)
+            asyncio.get_running_loop().call_later(pause_s * pace(), self._handle_lines)
 
     def _wait_for_more(self) -> None:
         if self._transport is None or self._transport.is_closing():
@@ -355,7 +356,7 @@ class Connection(asyncio.Protocol):
         self._stop_sampling()
         self.subscribed = True
         self._period_s = 1.0 / params["rate_hz"]
-        self._sampling = asyncio.get_running_loop().call_later(self._period_s, self._sample)
+        self._sampling = asyncio.get_running_loop().call_later(self._period_s * pace(), self._sample)
         return {"rate_hz": params["rate_hz"]}
 
     async def _unsubscribe(self, params: dict[str, Any]) -> dict[str, Any]:
@@ -369,7 +370,7 @@ class Connection(asyncio.Protocol):
             self._sampling = None
 
     def _sample(self) -> None:
-        self._sampling = asyncio.get_running_loop().call_later(self._period_s, self._sample)
+        self._sampling = asyncio.get_running_loop().call_later(self._period_s * pace(), self._sample)
         if self._reads_too_slowly():
             return
         self._send(protocol.make_notification("status", {**self._seen(), "lost_samples": self._lost}))
@@ -386,9 +387,8 @@ class Connection(asyncio.Protocol):
             return False
         self._lost += 1
         self._server.counters.lost_samples += 1
-        now = asyncio.get_running_loop().time()
-        self._slow_since = self._slow_since or now
-        if now - self._slow_since > STALLED_S:
+        self._slow_since = self._slow_since or outside_s()
+        if outside_s() - self._slow_since > STALLED_S:
             self._drop("it stopped reading")
         return True
 

@@ -15,6 +15,7 @@ from daemon.api.parameters import Role
 from daemon.api.peers import Peer
 from daemon.api.server import Server
 from daemon.api.tokens import Tokens
+from daemon.runtime.clock import pace
 
 LOGGER = logging.getLogger("canhelm.api")
 LOOPBACK: Final = "127.0.0.1"
@@ -90,7 +91,7 @@ class Visitor(asyncio.Protocol):
             transport.abort()
             return
         self._door.waiting.add(self)
-        self._patience = asyncio.get_running_loop().call_later(PATIENCE_S, self.turn_away)
+        self._patience = asyncio.get_running_loop().call_later(PATIENCE_S * pace(), self.turn_away)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """It has gone."""
@@ -129,7 +130,7 @@ class Visitor(asyncio.Protocol):
             return
         LOGGER.warning("somebody at %s showed a wrong token", _host(transport))
         refusal = PermissionRefused("the token is wrong", remedy="give one of the daemon's --tokens file")
-        asyncio.get_running_loop().call_later(WRONG_S, self._refuse, refusal)
+        asyncio.get_running_loop().call_later(WRONG_S * pace(), self._refuse, refusal)
 
     def _let_in(self, transport: asyncio.Transport, role: Role, request: int | str | None, rest: bytes) -> None:
         """From now on it is a client like any other."""

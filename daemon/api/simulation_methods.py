@@ -40,6 +40,13 @@ SIMULATION_METHODS = (
         "slope_deg, direction_deg",
     ),
     Method(
+        "simulation.pace",
+        "Let the time of a robot that is simulated in the daemon's process pass faster or slower, as far as the "
+        "machine can follow; leases and set-points go on being good in the client's time.",
+        (Param("factor", "number", "seconds of the simulation in one outside", "", minimum=0.1, maximum=4.0),),
+        "factor",
+    ),
+    Method(
         "simulation.lift",
         "Put the simulated robot onto blocks, its wheels in the air, or down again.",
         (Param("lifted", "boolean", "onto blocks"),),

@@ -56,6 +56,16 @@ def slope(degrees: float, /, *, direction: float = 0.0, options: Options = DEFAU
 
 
 @app.command
+def pace(factor: float, /, *, options: Options = DEFAULT) -> None:
+    """Let the time of a simulated robot pass faster or slower, from 0.1 to 4 times, as far as the machine can follow.
+
+    Example: `canhelm sim pace 0.25`
+    """
+    with options.client() as client:
+        show(client.call("simulation.pace", factor=factor), json=options.json)
+
+
+@app.command
 def lift(state: Literal["on", "off"], /, *, options: Options = DEFAULT) -> None:
     """Put the simulated robot onto blocks, its wheels in the air, or down again.
 

@@ -58,7 +58,7 @@ class CarMotion(Motion):
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """One step of the law; without a target it brings the car to rest."""
         self._remaining_s -= dt_s
-        self.target = self.newest(self.target, measurement.time_s)
+        self.target = self.newest(self.target)
         if self.stop_reason or self._remaining_s <= 0.0:
             self.target = None
         command, record = self._law.step(measurement, self._senses.odometry.pose.yaw_rad, self.target, dt_s)

@@ -19,6 +19,8 @@ from contextvars import Context
 from selectors import SelectorKey, SelectSelector
 from typing import Any, TypeVar, TypeVarTuple, Unpack
 
+from daemon.runtime.time_lapse import TimeLapse
+
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
 
@@ -133,6 +135,9 @@ class PatientLoop(asyncio.SelectorEventLoop):
     computes counts as time; what it spends without a processor, or blocked in a call, beyond ``GRACE_S`` at once does
     not.
 
+    The clock may be made to pass faster or slower. Clients and the service manager live outside of the simulation: what
+    they promise is judged by :func:`outside_s`.
+
     Attributes:
         stood_still_s: how much was left out since the loop was made.
     """
@@ -141,22 +146,53 @@ class PatientLoop(asyncio.SelectorEventLoop):
 
     def __init__(self) -> None:
         self.stood_still_s = 0.0
+        self._ahead_s = 0.0
+        self._lapse: TimeLapse | None = None
         self._seen_s, self._seen_processor_s = time.monotonic(), time.thread_time()
         super().__init__(_PatientSelector(self))
 
     def time(self) -> float:
-        """Seconds of a clock that never goes back; its zero is the monotonic clock's."""
+        """Seconds of a clock that never goes back; its zero is the monotonic clock's until :meth:`set_pace`."""
+        outside_s = self.outside_s()
+        return outside_s + self._ahead_s if self._lapse is None else self._lapse.computed(outside_s)
+
+    @property
+    def pace(self) -> float:
+        """How many seconds of the loop pass in one outside."""
+        return 1.0 if self._lapse is None else self._lapse.factor
+
+    def set_pace(self, factor: float) -> None:
+        """Let time pass so many times as fast from now on; it makes no jump."""
+        now_s = self.time()
+        outside_s = self._seen_s - self.stood_still_s
+        self._lapse = None if factor == 1.0 else TimeLapse(factor, outside_s, now_s)
+        self._ahead_s = now_s - outside_s
+
+    def outside_s(self) -> float:
+        """Seconds of the same clock as it passes outside of the simulation."""
         now_s, processor_s = time.monotonic(), time.thread_time()
         self._leave_out(now_s - self._seen_s - (processor_s - self._seen_processor_s))
         self._seen_s, self._seen_processor_s = now_s, processor_s
         return now_s - self.stood_still_s
 
-    def slept(self, wanted_s: float | None) -> None:
-        """A sleep has ended that was to last ``wanted_s`` at most; None: as long as it takes."""
+    def sleep_s(self, timeout_s: float | None) -> float | None:
+        """How long to sleep outside for a timer that is so far away by the loop; None: as long as it takes."""
+        self.time()
+        return timeout_s if timeout_s is None or self._lapse is None else self._lapse.sleep_s(timeout_s)
+
+    def slept(self, timeout_s: float | None, wanted_s: float | None) -> None:
+        """A sleep has ended.
+
+        Args:
+            timeout_s: how far away the next timer was by the loop; None: there was none.
+            wanted_s: how long the sleep was to last at most.
+        """
         now_s = time.monotonic()
         if wanted_s is not None:
             self._leave_out(now_s - self._seen_s - max(wanted_s, 0.0))
         self._seen_s, self._seen_processor_s = now_s, time.thread_time()
+        if self._lapse is not None:
+            self._lapse.slept(now_s - self.stood_still_s, timeout_s)
 
     def _leave_out(self, waited_s: float) -> None:
         if waited_s > self.GRACE_S:
@@ -171,9 +207,9 @@ class _PatientSelector(SelectSelector):
         self._loop = loop
 
     def select(self, timeout: float | None = None) -> list[tuple[SelectorKey, int]]:
-        self._loop.time()
-        events = super().select(timeout)
-        self._loop.slept(timeout)
+        wanted_s = self._loop.sleep_s(timeout)
+        events = super().select(wanted_s)
+        self._loop.slept(timeout, wanted_s)
         return events
 
 
@@ -187,6 +223,18 @@ def stood_still_s() -> float:
     """What the running loop's clock has left out, see :class:`PatientLoop`; 0 on any other loop."""
     loop = asyncio.get_running_loop()
     return loop.stood_still_s if isinstance(loop, PatientLoop) else 0.0
+
+
+def outside_s() -> float:
+    """Time for who lives outside of a simulation, clients and the service manager; on a real robot the loop's."""
+    loop = asyncio.get_running_loop()
+    return loop.outside_s() if isinstance(loop, PatientLoop) else loop.time()
+
+
+def pace() -> float:
+    """How many seconds of the running loop pass in one outside of its simulation."""
+    loop = asyncio.get_running_loop()
+    return loop.pace if isinstance(loop, PatientLoop) else 1.0
 
 
 class Ticker:

@@ -43,7 +43,7 @@ class DifferentialStream(Motion):
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """Follow the newest value, or come to rest where it is too old or the motion was stopped."""
-        wanted: SetPoint = self.newest(None, measurement.time_s) or STANDING
+        wanted: SetPoint = self.newest(None) or STANDING
         command = self._law.step(*(STANDING if self.stop_reason else wanted), dt_s)
         rests = all(abs(speed) < AT_REST_M_S for speed in measurement.wheel_speed_m_s)
         if self.stop_reason and rests and not any(command.wheel_speed_m_s):

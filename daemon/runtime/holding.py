@@ -48,9 +48,9 @@ class Holding:
         for motion in held:
             await motion.closed.wait()
 
-    def watch(self, now_s: float) -> None:
+    def watch(self) -> None:
         """Stop the motions of leases that have run out."""
-        for lease, client in self.leases.expired(now_s):
+        for lease, client in self.leases.expired():
             self._release(lease, f"the lease of {client} ran out")
 
     @property

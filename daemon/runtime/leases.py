@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import asyncio
 import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from canhelm.errors import Refused
+from daemon.runtime.clock import outside_s
 
 
 @dataclass(slots=True)
@@ -17,7 +17,7 @@ class Lease:
 
     Attributes:
         client: who holds it, for people.
-        expires_s: loop time at which it runs out unless renewed.
+        expires_s: time at which it runs out unless renewed, see :func:`daemon.runtime.clock.outside_s`.
         details: of the client, for programs.
     """
 
@@ -42,7 +42,7 @@ class Leases:
     def open(self, client: str, details: Mapping[str, Any]) -> str:
         """A new lease for a client; returns its id."""
         lease = f"lease-{next(self._numbers)}"
-        self._leases[lease] = Lease(client, asyncio.get_running_loop().time() + self.timeout_s, details)
+        self._leases[lease] = Lease(client, outside_s() + self.timeout_s, details)
         return lease
 
     def take(self, lease: str) -> None:
@@ -68,7 +68,7 @@ class Leases:
 
     def renew(self, lease: str) -> None:
         """Keep a lease alive. Raises Refused where it has run out or never was."""
-        self._known(lease).expires_s = asyncio.get_running_loop().time() + self.timeout_s
+        self._known(lease).expires_s = outside_s() + self.timeout_s
 
     def client(self, lease: str) -> str:
         """Who holds a lease. Raises Refused where it has run out or never was."""
@@ -78,8 +78,9 @@ class Leases:
         """End a lease; its motions are the caller's to stop."""
         self._leases.pop(lease, None)
 
-    def expired(self, now_s: float) -> list[tuple[str, str]]:
+    def expired(self) -> list[tuple[str, str]]:
         """Take out the leases that have run out: their ids and clients."""
+        now_s = outside_s()
         gone = [(lease, entry.client) for lease, entry in self._leases.items() if entry.expires_s < now_s]
         for lease, _ in gone:
             del self._leases[lease]

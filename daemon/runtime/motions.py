@@ -76,14 +76,14 @@ class Motion(ABC):
         """Bring the motion to rest by its ramp and end it."""
         self.stop_reason = self.stop_reason or reason
 
-    def newest(self, target: T | None, now_s: float) -> T | None:
+    def newest(self, target: T | None) -> T | None:
         """What to do now: the stream's value, None where that is too old; without a stream the target as it is.
 
         A stream that is over stops the motion.
         """
         if self.stream is None:
             return target
-        value: T | None = self.stream.at(now_s)
+        value: T | None = self.stream.newest()
         if not self.stop_reason and self.stream.over:
             self.stop("no new value came")
         return value

@@ -161,7 +161,7 @@ class TwistMotion(OmniMotion):
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """The twist until the time is over or the newest is too old, then rest."""
         self._remaining_s -= dt_s
-        twist = self.newest(self._guide.twist, measurement.time_s)
+        twist = self.newest(self._guide.twist)
         self._guide.twist = STANDING if twist is None or self._remaining_s <= 0.0 else twist
         return super().step(measurement, dt_s)
 

@@ -65,7 +65,7 @@ class OwnMotion(Motion):
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """One step of the law; without a target it brings the robot to rest."""
-        self.target = self.newest(self.target, measurement.time_s)
+        self.target = self.newest(self.target)
         if self.stop_reason or self._remaining_s < dt_s / 2:
             self.target = None
         self._remaining_s -= dt_s

@@ -43,7 +43,7 @@ class PairedSteerMotion(Motion):
 
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """One step of the law; without a target it brings the robot to rest and engages the brakes."""
-        self._target = None if self.stop_reason else self.newest(self._target, measurement.time_s)
+        self._target = None if self.stop_reason else self.newest(self._target)
         command, record = self._law.step(measurement, self._target, dt_s)
         self.record = record
         if self._target is not None:

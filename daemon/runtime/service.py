@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from daemon.runtime.clock import stood_still_s
+from daemon.runtime.clock import pace, stood_still_s
 from daemon.runtime.commands import Commands
 from daemon.runtime.cycle import Cycle
 from daemon.runtime.localising import Localiser
@@ -94,6 +94,7 @@ class Service:
             "state": self.state,
             "message": supervisor.message,
             "time_s": round(asyncio.get_running_loop().time(), 3),
+            "pace": pace(),
             "nodes": [device.status() for device in supervisor.devices.all],
             "bricks": [{"name": name, **brick.status()} for name, brick in supervisor.devices.bricks.items()],
             "brakes": [brake.status() for brake in supervisor.devices.brakes.values()],

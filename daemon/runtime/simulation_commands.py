@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 from typing import Any, Protocol
 
 from canhelm.errors import NodeAbsent, Refused
+from daemon.runtime.clock import PatientLoop
 from daemon.runtime.handlers import Handler, Params, node_number
 from daemon.runtime.supervisor import Supervisor
 
@@ -49,6 +51,7 @@ class SimulationCommands:
             "simulation.input": self._input,
             "simulation.turn": self._turn,
             "simulation.slope": self._slope,
+            "simulation.pace": self._pace,
         }
 
     async def _power(self, params: Params, lease: str | None) -> dict[str, Any]:
@@ -88,6 +91,14 @@ class SimulationCommands:
         slope_deg, direction_deg = float(params["slope_deg"]), float(params["direction_deg"])
         network.tilt(math.radians(slope_deg), math.radians(direction_deg))
         return {"slope_deg": slope_deg, "direction_deg": direction_deg}
+
+    async def _pace(self, params: Params, lease: str | None) -> dict[str, Any]:
+        self._simulated("its time passes as it does")
+        loop = asyncio.get_running_loop()
+        if not isinstance(loop, PatientLoop):
+            raise Refused("the time of this simulation is not the machine's", remedy="leave it as it is")
+        loop.set_pace(float(params["factor"]))
+        return {"factor": loop.pace}
 
     def _simulated(self, why_not: str) -> Network:
         if self._network is None:

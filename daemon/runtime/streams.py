@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import asyncio
 from typing import Any, Generic, TypeVar
+
+from daemon.runtime.clock import outside_s
 
 T = TypeVar("T")
 STREAM_END_S = 2.0
@@ -18,7 +19,7 @@ class Streamed(Generic[T]):
         valid_for_s: age at which it is too old.
 
     Attributes:
-        age_s: of the newest value when :meth:`at` was asked last.
+        age_s: of the newest value when it was asked for last.
     """
 
     def __init__(self, value: T, valid_for_s: float) -> None:
@@ -30,11 +31,11 @@ class Streamed(Generic[T]):
         """A new value; one that equals the last is that same object."""
         self._value = self._value if value == self._value else value
         self._valid_for_s = valid_for_s
-        self._taken_s = asyncio.get_running_loop().time()
+        self._taken_s = outside_s()
 
-    def at(self, now_s: float) -> T | None:
-        """The value at this loop time; None where it is too old."""
-        self.age_s = now_s - self._taken_s
+    def newest(self) -> T | None:
+        """The value now; None where it is too old, by the time of who sends it."""
+        self.age_s = outside_s() - self._taken_s
         return self._value if self.age_s <= self._valid_for_s else None
 
     @property

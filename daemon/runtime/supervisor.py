@@ -236,7 +236,7 @@ class Supervisor:
         vehicle = self.vehicle
         measurement = self.measurement = vehicle.measure(now_s)
         self._stopping.rest.look((*measurement.wheel_speed_m_s, *[drive.speed_m_s for drive in vehicle.aside]))
-        self._holding.watch(now_s)
+        self._holding.watch()
         self._watch_devices(now_s)
         self._watch_readings(measurement, dt_s)
         wanted = self._ask_motions(measurement, dt_s)

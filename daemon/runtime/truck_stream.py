@@ -41,7 +41,7 @@ class TruckStream(Motion):
     def step(self, measurement: Measurement, dt_s: float) -> Command:
         """Follow the newest value, or come to rest where it is too old or the motion was stopped."""
         vehicle = self._vehicle
-        target: TruckTarget | None = self.newest(None, measurement.time_s)
+        target: TruckTarget | None = self.newest(None)
         record = self.record = self._law.step(vehicle.reading, None if self.stop_reason else target, dt_s)
         rests = record.speed_m_s == 0.0 and abs(vehicle.reading.speed_m_s) < AT_REST_M_S
         if record.failure and rests:

@@ -55,6 +55,7 @@ TYPED = (
     ("sim input 3 1 low", 1, ""),
     ("sim turn front 5", 1, ""),
     ("sim slope 5", 1, ""),
+    ("sim pace 2", 1, ""),
     ("sim lift on", 1, ""),
     ("sim hand front_left 10", 1, ""),
     ("sim look", 1, ""),

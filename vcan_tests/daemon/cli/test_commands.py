@@ -52,6 +52,7 @@ SENT: list[tuple[str, str, dict[str, Any]]] = [
     ("sdo write 1 target_velocity -20", "sdo.write", {"value": -20}),
     ("sim power all off", "simulation.power", {"node": "all", "on": False}),
     ("sim slope 5 --direction 90", "simulation.slope", {"slope_deg": 5.0, "direction_deg": 90.0}),
+    ("sim pace 0.25", "simulation.pace", {"factor": 0.25}),
     ("sim turn front 12.5", "simulation.turn", {"node": "front", "angle_deg": 12.5}),
     ("sim turn front", "simulation.turn", {"node": "front", "angle_deg": None}),
     (
