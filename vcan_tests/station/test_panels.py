@@ -49,6 +49,20 @@ def test_a_motor_turns_as_long_as_its_button_is_held(operator: Operator, robot: 
     robot.comes_to_rest(within_s=2.0)
 
 
+def test_a_button_that_is_pressed_again_at_once_turns_the_motor_again(operator: Operator, robot: Robot) -> None:
+    jogs(operator, robot)
+    first = robot.status()["motions"][0]["motion"]
+    operator.page.mouse.up()
+    operator.page.mouse.down()
+    robot.comes_to(lambda status: not status["motions"] or status["motions"][0]["motion"] != first, within_s=5.0)
+    operator.until(
+        lambda: turning(robot.status()), lambda: f"not turning: {operator.text(CARD)} {operator.text('#notices')}"
+    )
+    operator.page.mouse.up()
+    robot.comes_to_rest(within_s=2.0)
+    assert operator.text("#alarms") == ""
+
+
 def test_a_motor_that_is_jogged_stops_when_the_page_is_gone(operator: Operator, robot: Robot) -> None:
     jogs(operator, robot)
     operator.page.close()

@@ -3,7 +3,7 @@
 import { badge, setBadge } from "./badge.js";
 import { BusTables } from "./bus.js";
 import { DriveCard, brakeCard, brickCard, encoderCard, nodeState } from "./device_card.js";
-import { h, redraw, text } from "./dom.js";
+import { h, redraw, seldom, text } from "./dom.js";
 import { Rows, table } from "./rows.js";
 
 /** A part of the panel that is hidden where this robot has nothing for it. */
@@ -95,7 +95,8 @@ export function create(station) {
     bus.show(station.status ?? {});
   });
   station.on("robot", () => parts.forEach((part) => part.clear()));
-  for (const kind of ["status", "stale", "robot", "connected"]) station.on(kind, draw);
+  station.on("status", seldom(draw));
+  for (const kind of ["stale", "robot", "connected"]) station.on(kind, draw);
   return element;
 }
 

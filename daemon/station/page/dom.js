@@ -56,6 +56,17 @@ export function redraw(element, draw) {
   };
 }
 
+/** Call no more often than people can read: news in between are in the next call, as long as news keep coming. */
+export function seldom(draw, period_ms = 100) {
+  let last_ms = -Infinity;
+  return () => {
+    const now_ms = performance.now();
+    if (now_ms - last_ms < period_ms) return;
+    last_ms = now_ms;
+    draw();
+  };
+}
+
 /**
  * Let a control be used, or disable it with the reason for people.
  *

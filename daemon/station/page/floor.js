@@ -1,7 +1,7 @@
 /** The floor of the simulation: its slope, and ice under the wheels. */
 
 import { badge, setBadge } from "./badge.js";
-import { allow, h, text } from "./dom.js";
+import { allow, attribute, h, text } from "./dom.js";
 import { Rows, table } from "./rows.js";
 
 /** Rubber on wet ice. */
@@ -38,7 +38,8 @@ export class Slope {
     for (const control of [this.#slope, this.#direction, this.#tilt, this.#level]) allow(control, reason);
     text(this.#why, reason ? `Slope: ${reason}` : "");
     const param = this.#station.methods.get("simulation.slope")?.params.find(({ name }) => name === "slope_deg");
-    if (param) [this.#slope.min, this.#slope.max] = [param.minimum ?? "", param.maximum ?? ""];
+    attribute(this.#slope, "min", param?.minimum);
+    attribute(this.#slope, "max", param?.maximum);
   }
 
   #makeLevel() {

@@ -10,7 +10,8 @@ const LET_GO = ["pointerup", "pointercancel", "lostpointercapture", "blur"];
 export class Jog {
   #station;
   #drive;
-  #direction = 0;
+  #held = null;
+  #turning = null;
   #input;
   #buttons;
   #letGo = () => this.#release();
@@ -31,7 +32,7 @@ export class Jog {
 
   /** Let it be used, or not, with the reason. */
   allow(reason) {
-    if (reason && this.#direction) this.#release();
+    if (reason && this.#held) this.#release();
     for (const control of [this.#input, ...this.#buttons]) allow(control, reason);
   }
 
@@ -54,32 +55,42 @@ export class Jog {
     return button;
   }
 
+  /** A motor that is still being stopped is waited for. */
   async #press(direction) {
     const speed_rpm = Number(this.#input.value);
-    if (this.#direction || !this.#input.reportValidity() || !speed_rpm) return;
-    this.#hold(direction);
+    if (this.#held || !this.#input.reportValidity() || !speed_rpm) return;
+    const held = this.#hold({ direction });
+    await this.#turning;
+    if (held !== this.#held) return;
     const asked = { node: this.#drive, velocity_rpm: direction * speed_rpm, duration_s: LONGEST_S };
+    this.#turning = this.#turn(asked, held);
+  }
+
+  async #turn(asked, held) {
     try {
       await this.#station.call("motor.velocity", asked, { timeout_ms: 0 });
-      if (this.#direction) this.#station.say(`${this.#drive} stopped after ${LONGEST_S} s: hold the button again`);
+      if (held === this.#held) this.#station.say(`${this.#drive} stopped after ${LONGEST_S} s: hold the button again`);
     } catch (error) {
-      if (this.#direction) this.#station.say(`jog of ${this.#drive}: ${error.message}`, "error", error.remedy);
-    } finally {
-      this.#hold(0);
+      if (held === this.#held) this.#station.say(`jog of ${this.#drive}: ${error.message}`, "error", error.remedy);
     }
+    if (held === this.#held) this.#hold(null);
   }
 
   #release() {
-    if (!this.#direction) return;
-    this.#hold(0);
+    if (!this.#held) return;
+    this.#hold(null);
     this.#station.attempt(this.#station.call("motor.stop", { node: this.#drive }), `stop of ${this.#drive}`);
   }
 
-  #hold(direction) {
-    this.#direction = direction;
-    if (direction) this.#station.lease.hold(this);
+  /** Renew the lease while a button is held, and see that nothing else can take the hand's place. */
+  #hold(held) {
+    this.#held = held;
+    if (held) this.#station.lease.hold(this);
     else this.#station.lease.release(this);
-    document[direction ? "addEventListener" : "removeEventListener"]("visibilitychange", this.#letGo);
-    this.#buttons.forEach((button, at) => attribute(button, "aria-pressed", direction === 2 * at - 1 ? "true" : "false"));
+    const change = held ? "addEventListener" : "removeEventListener";
+    document[change]("visibilitychange", this.#letGo);
+    window[change]("hashchange", this.#letGo);
+    this.#buttons.forEach((button, at) => attribute(button, "aria-pressed", held?.direction === 2 * at - 1 ? "true" : "false"));
+    return held;
   }
 }

@@ -1,6 +1,6 @@
 /** The panel of the simulated network: faults, floor, power, blocks, and the speed of time. */
 
-import { allow, h, redraw, text } from "./dom.js";
+import { allow, h, redraw, seldom, text } from "./dom.js";
 import { FaultForm, FaultList } from "./faults.js";
 import { Ice, Slope } from "./floor.js";
 import { Rows, table } from "./rows.js";
@@ -141,7 +141,8 @@ class SimulationPanel {
       part("Faults", this.#list.element, this.#form.element), part("Power", this.#power.element));
     this.element = h("section", { class: "simulation" }, h("h2", {}, "Simulation"), this.#real, this.#tools);
     this.#draw = redraw(this.element, () => this.#show());
-    for (const kind of ["status", "shape", "connected", "robot"]) station.on(kind, this.#draw);
+    station.on("status", seldom(this.#draw));
+    for (const kind of ["shape", "connected", "robot"]) station.on(kind, this.#draw);
     station.on("robot", () => (this.#faults = []));
     addEventListener("hashchange", () => this.#look());
     setInterval(() => this.#look(), LOOK_MS);
