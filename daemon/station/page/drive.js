@@ -67,12 +67,13 @@ class DrivePanel {
 
   #build() {
     const commanded = h("p", { class: "commanded" }, "Commanded: ", this.#sent);
+    const byStick = h("div", {}, this.#stick.element, this.#asideHint, commanded);
     return h(
       "section",
       { class: "drive" },
       h("h2", {}, "Drive by hand"),
       this.#why,
-      h("div", { class: "hands" }, h("div", {}, this.#stick.element, this.#asideHint, commanded), this.#sliders.element),
+      h("div", { class: "hands" }, byStick, this.#sliders.element),
       h("div", { class: "row" }, this.#keyboard.button, this.#keyboard.hint),
       h("h3", {}, "Gamepad"),
       this.#gamepad.element,

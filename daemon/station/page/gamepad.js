@@ -100,10 +100,11 @@ export class GamepadDriver {
   get #why() {
     const { buttons, sticks } = this.#told ?? {};
     if (!this.#pad) return NO_PAD;
-    if (this.#pad.mapping !== "standard") return `${this.#pad.id} is none that this browser knows: \`canhelm drive joystick\``;
+    if (this.#pad.mapping !== "standard") return `this browser does not know ${this.#pad.id}: \`canhelm drive joystick\``;
     if (!sticks) return this.#station.cannot("drive.set") ?? "no gamepad drives this vehicle";
-    const strange = Object.values(sticks).map((stick) => stick.axis).find((axis) => !(axis in AXES));
-    if (strange || !(buttons.dead_man in BUTTONS)) return `the profile names ${strange ?? buttons.dead_man}, unknown to browsers`;
+    const axes = Object.values(sticks).map((stick) => stick.axis);
+    const strange = axes.find((axis) => !(axis in AXES)) ?? (buttons.dead_man in BUTTONS ? null : buttons.dead_man);
+    if (strange) return `the profile names ${strange}, which browsers do not know`;
     if (this.element.closest("[hidden]")) return "show this panel to drive";
     return "";
   }

@@ -78,7 +78,8 @@ function showConnection(station) {
   text(element("connection"), connectionWords(station));
   text(element("connection-told"), station.stale ? "values are stale" : "connected");
   element("stale").hidden = !station.stale || !station.status;
-  text(element("stale"), `Stale: nothing heard for ${ageWords(station)}. All values are old, and nothing can be moved.`);
+  const since = ageWords(station);
+  text(element("stale"), `Stale: nothing heard for ${since}. All values are old, and nothing can be moved.`);
 }
 
 function connectionWords({ robot, connected, stale, status, reason, age_s }) {

@@ -12,7 +12,7 @@ export class HeldKeys {
   #down = new Set();
   #changed;
 
-  /** @param {function(number, number, boolean): void} changed given left and forward, -1 to 1, and whether any is held */
+  /** @param {function(number, number, boolean): void} changed given left and forward, -1 to 1, and whether one is held */
   constructor(changed) {
     this.#changed = changed;
   }

@@ -79,7 +79,8 @@ export class TakenAtRest {
   apply(commands) {
     const rolling = Boolean(commands.speed || commands.sideways);
     if (!rolling || !this.#rolling) {
-      this.#kept = Object.fromEntries(this.#names.filter((name) => name in commands).map((name) => [name, commands[name]]));
+      const names = this.#names.filter((name) => name in commands);
+      this.#kept = Object.fromEntries(names.map((name) => [name, commands[name]]));
     }
     this.#rolling = rolling;
     return { ...commands, ...this.#kept };

@@ -9,7 +9,7 @@ const PERIOD_MS = 100;
 /** Age at which the daemon drops a set-point. */
 const VALID_FOR_MS = 300;
 /** An answer that took longer: the robot has stopped meanwhile, and does not go on by itself. */
-const LINK_LOST_MS = 1000;
+const LINK_LOST_S = 1;
 const NO_MORE = "let go, and hold it again to drive";
 
 export class SetPoints {
@@ -77,10 +77,10 @@ export class SetPoints {
       const values = this.#source.values();
       this.onSent(values);
       const parameters = { ...values, valid_for_ms: VALID_FOR_MS };
-      const answer = await this.#station.call("drive.set", parameters, { timeout_ms: 2 * LINK_LOST_MS });
+      const answer = await this.#station.call("drive.set", parameters, { timeout_ms: 2000 * LINK_LOST_S });
       this.#follow(answer.motion);
-      const took_ms = performance.now() - begun_ms;
-      if (took_ms > LINK_LOST_MS) this.#lose(`the robot answered after ${(took_ms / 1000).toFixed(1)} s, and has stopped`);
+      const took_s = (performance.now() - begun_ms) / 1000;
+      if (took_s > LINK_LOST_S) this.#lose(`the robot answered after ${took_s.toFixed(1)} s, and has stopped`);
     } catch (error) {
       this.#lose(error.remedy ? `${error.message} – ${error.remedy}` : error.message);
     } finally {
@@ -89,7 +89,7 @@ export class SetPoints {
     }
   }
 
-  /** Remember the motion of these set-points; when it ends before its control is let go of, something has stopped it. */
+  /** Remember the motion of these set-points; one that ends before its control is let go of was stopped. */
   #follow(motion) {
     if (motion === this.#motion) return;
     this.#motion = motion;

@@ -65,7 +65,7 @@ class Slider {
 }
 
 export class Sliders {
-  #sliders = Object.fromEntries(Object.entries(LABELS).map(([name, label]) => [name, new Slider(name, label, LACKS[name])]));
+  #sliders = Object.fromEntries(Object.keys(LABELS).map((name) => [name, new Slider(name, LABELS[name], LACKS[name])]));
   #fastest = new Slider("fastest", "Top speed", LACKS.speed);
   #ranges = {};
   #held = false;
@@ -89,7 +89,7 @@ export class Sliders {
     this.#ranges = ranges;
     for (const [name, slider] of Object.entries(this.#sliders)) slider.use(ranges[name] ?? null);
     const { speed } = ranges;
-    this.#fastest.use(speed ? { least: 0, full: speed.full, unit: speed.unit } : null, FIRST_SHARE * (speed?.full ?? 0));
+    this.#fastest.use(speed ? { ...speed, least: 0 } : null, FIRST_SHARE * (speed?.full ?? 0));
   }
 
   /** What the sliders command, by command; those that the vehicle has not are left out. */

@@ -5,7 +5,8 @@ const ANSWER_MS = 2000;
 /** Longest time from a pointer's press to the click that it makes. */
 const CLICK_MS = 1000;
 /** Inputs in which a space is something to write. */
-const WRITING = "textarea, [contenteditable], input:is([type=text], [type=search], [type=password], [type=url], :not([type]))";
+const WRITING_TYPES = "[type=text], [type=search], [type=password], [type=url], :not([type])";
+const WRITING = `textarea, [contenteditable], input:is(${WRITING_TYPES})`;
 const TICKED = "input:is([type=checkbox], [type=radio])";
 
 export class Stopper {
