@@ -136,10 +136,15 @@ def _counters(fleet: Fleet, robot: Robot, wire: Wire) -> tuple[float, ...]:
 
 
 def watch_open_page(browser: Browser, fleet: Fleet, minutes: float, told: Callable[[Look], None]) -> list[Look]:
-    """Looks at a page that stays open: after its first minute, and each tenth of the time from there on."""
+    """Looks at a page that stays open: after its first minute, and each tenth of the time from there on.
+
+    The robot drives in a circle meanwhile, so that map and devices are drawn anew at each update.
+    """
     robot = next(iter(fleet.robots.values()))
     with wire_to(fleet.station.port) as wire, open_pages(browser, wire, robot, 1) as (operator,):
+        operator.go_to("devices")
         operator.page.evaluate(COUNT_UPDATES)
+        robot.call("drive.turn", rear_deg=-15.0, front_deg=15.0, speed_m_s=0.2, duration_s=3600.0, wait=False)
         session = operator.context.new_cdp_session(operator.page)
         begun_s, looks = time.monotonic(), []
         for tenth in range(11):
@@ -147,6 +152,7 @@ def watch_open_page(browser: Browser, fleet: Fleet, minutes: float, told: Callab
             operator.page.wait_for_timeout(max(0.0, wanted_s - (time.monotonic() - begun_s)) * 1e3)
             looks.append(_look(operator, session, fleet, robot, time.monotonic() - begun_s))
             told(looks[-1])
+        robot.call("stop")
         assert operator.unexpected() == [], operator.unexpected()
     return looks
 

@@ -20,14 +20,13 @@ from vcan_tests.station.suite import require_chromium, version
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
-PARTS = ("stop", "pages", "open")
 Kept = dict[str, object]
 
 
 def main() -> int:
     """Measure what was asked for; the figures go to stdout and into a file."""
     parser = argparse.ArgumentParser(prog="make station-figures", description=__doc__)
-    parser.add_argument("parts", nargs="*", choices=[*PARTS, []], default=PARTS, help="which (default: all)")
+    parser.add_argument("--part", choices=list(MEASURES), action="append", help="only this one")
     parser.add_argument("--minutes", type=positive, default=10.0, help="that a page stays open (default 10)")
     parser.add_argument("--seconds", type=positive, default=20.0, help="of each number of pages (default 20)")
     parser.add_argument("--presses", type=int, default=100, help="of the stop (default 100)")
@@ -41,7 +40,7 @@ def main() -> int:
         chromium() as browser,
         running_fleet(Path(folder), ("max2d",)) as fleet,
     ):
-        for part in asked.parts:
+        for part in asked.part or MEASURES:
             MEASURES[part](browser, fleet, asked, kept)
     asked.out.mkdir(parents=True, exist_ok=True)
     (asked.out / "station.json").write_text(json.dumps(kept, indent=1))

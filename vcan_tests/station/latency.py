@@ -60,7 +60,10 @@ class Latency:
 
     def lines(self) -> list[str]:
         """For people."""
-        cuts = [quantiles([getattr(press, name) for press in self.presses], n=100) for name in ("first_s", "last_s")]
+        cuts = [
+            quantiles([getattr(press, name) for press in self.presses], n=100, method="inclusive")
+            for name in ("first_s", "last_s")
+        ]
         told = [f"p50 {cut[49] * 1e3:.1f} ms, p99 {cut[98] * 1e3:.1f} ms" for cut in cuts]
         still = max(press.still_s for press in self.presses)
         return [

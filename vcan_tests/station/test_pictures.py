@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from io import BytesIO
 from pathlib import Path
 
 import pytest
@@ -18,7 +19,6 @@ pytestmark = pytest.mark.station
 
 ROBOTS = ("semitrailer",)
 PATH = {"pieces": [{"line_m": 1.0}, {"arc_deg": 60, "radius_m": 1.2}, {"drive": "backward", "line_m": 0.8}]}
-COLOURS = 96
 FEWEST_COLOURS = 12
 """A page on which nothing is drawn has fewer."""
 LARGEST_BYTES = 150_000
@@ -33,13 +33,12 @@ def folder(tmp_path: Path) -> Path:
 
 
 def take(operator: Operator, folder: Path, name: str) -> None:
-    """Keep what is seen now, in few colours: it is text and lines."""
-    file = folder / f"{name}.png"
-    operator.page.screenshot(path=file, animations="disabled")
-    with Image.open(file) as picture:
+    """Keep what is seen now."""
+    file = folder / f"{name}.webp"
+    with Image.open(BytesIO(operator.page.screenshot(animations="disabled"))) as picture:
         shown = picture.convert("RGB")
-        assert len(shown.getcolors(1 << 24) or ()) >= FEWEST_COLOURS, name
-        shown.quantize(COLOURS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).save(file, optimize=True)
+    assert len(shown.getcolors(1 << 24) or ()) >= FEWEST_COLOURS, name
+    shown.save(file, lossless=True, method=6)
     assert file.stat().st_size < LARGEST_BYTES, (name, file.stat().st_size)
 
 
