@@ -24,6 +24,10 @@ HEADERS: Final = {
     "Server": "canhelm",
     "X-Content-Type-Options": "nosniff",
 }
+EVERYWHERE: Final = ("0.0.0.0", "::")
+"""Addresses of a server that listens on all addresses of its machine."""
+_ELSEWHERE: Final = ("192.0.2.1", 9)
+"""An address that nobody has (RFC 5737)."""
 _OWN_PAGES: Final = ("same-origin", "none")
 """``Sec-Fetch-Site`` of the station's own page, and of an address that a person has typed."""
 
@@ -43,7 +47,7 @@ class Guard:
     def refusal(self, request: web.Request) -> CanhelmError | None:
         """Why a request is not looked at; None for one that is."""
         host = request.headers.get("Host", "")
-        if not self._is_here(host):
+        if not self.is_here(host):
             name = host[:80]
             return PermissionRefused(f"{name!r} is no name of this station", remedy="use the address that it printed")
         origin = request.headers.get("Origin")
@@ -53,7 +57,7 @@ class Guard:
             return PermissionRefused("another page may not use this station", remedy="open the station's own page")
         return None
 
-    def _is_here(self, host: str) -> bool:
+    def is_here(self, host: str) -> bool:
         """Whether a ``Host`` is this machine. No page of a stranger has a bare address for its name."""
         try:
             name = (urlsplit(f"//{host}").hostname or "").rstrip(".")
@@ -67,6 +71,16 @@ class Guard:
 def is_loopback(host: str) -> bool:
     """Whether only this machine reaches an address."""
     return host == "localhost" or (_is_address(host) and ipaddress.ip_address(host).is_loopback)
+
+
+def own_address() -> str:
+    """The address by which this machine would talk to others, or its name where it could not. Nothing is sent."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(_ELSEWHERE)
+        except OSError:
+            return socket.gethostname()
+        return str(probe.getsockname()[0])
 
 
 async def say_what_is_allowed(request: web.Request, answer: web.StreamResponse) -> None:

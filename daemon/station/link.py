@@ -33,6 +33,8 @@ MAX_PENDING: Final = 8
 """Methods of the station itself that one page may have under way."""
 STALLED_S: Final = 10.0
 """Time without reading after which a page is hung up on."""
+FLUSH_S: Final = 1.0
+"""How long a page is sent what waits for it when its daemon has gone."""
 UNSENT_BYTES: Final = 16 * 1024
 """What the kernel holds for a page beyond what is on its way: samples that wait there would only get older."""
 _REASON_BYTES: Final = 123
@@ -79,13 +81,17 @@ class Link:
         page_socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, UNSENT_BYTES)
         connection.setblocking(False)
         reader, writer = await asyncio.open_connection(sock=connection, limit=protocol.MAX_ANSWER_BYTES)
-        ways = [asyncio.create_task(way) for way in (self._ask(writer), self._hear(reader), self._tell())]
+        asking, hearing = asyncio.create_task(self._ask(writer)), asyncio.create_task(self._hear(reader))
+        telling = asyncio.create_task(self._tell())
         try:
-            done, _ = await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
+            done, _ = await asyncio.wait([asking, hearing, telling], return_when=asyncio.FIRST_COMPLETED)
         finally:
             writer.close()
-            await _cancel([*ways, *self._own])
-        ending = next((way.result() for way in done if way.result() is not None), None)
+            await _cancel([asking, hearing, *self._own])
+            self._outbox.end()
+            await asyncio.wait([telling], timeout=FLUSH_S)  # not cancelled while aiohttp compresses in a thread
+            await _cancel([telling])
+        ending = next((way.result() for way in (asking, hearing) if way in done and way.result()), None)
         if ending is not None:
             await hang_up(self._page, *ending)
         if self._outbox.lost:
@@ -189,18 +195,17 @@ class Link:
             pass  # a broken pipe and an endless line end the connection like a hang-up
         return self._gone(farewell)
 
-    async def _tell(self) -> Ending | None:
+    async def _tell(self) -> None:
         """Carry that to the page."""
-        while True:
-            line = lowered(await self._outbox.get(), self._limit)
+        while line := await self._outbox.get():
             try:
                 async with asyncio.timeout(STALLED_S):
-                    await self._page.send_frame(line.rstrip(), WSMsgType.TEXT)
+                    await self._page.send_frame(lowered(line, self._limit).rstrip(), WSMsgType.TEXT)
             except TimeoutError:
                 self._give_up("it stopped reading")
-                return None
+                return
             except ConnectionError:
-                return None
+                return
 
     def _gone(self, farewell: str = "") -> Ending:
         return NO_DAEMON, farewell or f"the daemon of {self._robot.name} hung up"

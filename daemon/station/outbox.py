@@ -29,6 +29,7 @@ class Outbox:
         self._lines: deque[bytes] = deque()
         self._unsent_bytes = 0
         self._status: bytes | None = None
+        self._ended = False
         self._filled = asyncio.Event()
 
     @property
@@ -48,9 +49,14 @@ class Outbox:
             self._unsent_bytes += len(line)
         self._filled.set()
 
+    def end(self) -> None:
+        """Nothing more comes."""
+        self._ended = True
+        self._filled.set()
+
     async def get(self) -> bytes:
-        """The next message to send, as soon as there is one; a sample of the status comes last."""
-        while not self._lines and self._status is None:
+        """The next message to send, as soon as there is one, samples of the status last; empty where none comes."""
+        while not self._lines and self._status is None and not self._ended:
             self._filled.clear()
             await self._filled.wait()
         if self._lines:

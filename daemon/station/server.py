@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any, Final
@@ -15,7 +16,7 @@ from canhelm.errors import CanhelmError, ConfigError, DaemonNotRunning, Permissi
 from daemon.api.parameters import Role
 from daemon.api.tokens import Tokens
 from daemon.station import runs
-from daemon.station.guard import Guard, say_what_is_allowed
+from daemon.station.guard import EVERYWHERE, Guard, own_address, say_what_is_allowed
 from daemon.station.link import NO_DAEMON, Link, hang_up
 from daemon.station.robots import Robot, Robots
 from daemon.station.sessions import Sessions
@@ -57,9 +58,9 @@ class Station:
 
     @property
     def url(self) -> str:
-        """The address of the page."""
-        host = f"[{self.host}]" if ":" in self.host else self.host
-        return f"http://{host}:{self.port}/"
+        """The address of the page; of all addresses of this machine the one that others most likely reach it by."""
+        host = own_address() if self.host in EVERYWHERE else self.host
+        return f"http://{f'[{host}]' if ':' in host else host}:{self.port}/"
 
     async def start(self) -> None:
         """Listen. Raises ConfigError where that is not possible."""
@@ -68,9 +69,8 @@ class Station:
             await web.TCPSite(self._runner, self.host, self.port).start()
         except (OSError, OverflowError) as error:
             await self._runner.cleanup()
-            reason = getattr(error, "strerror", None) or str(error)
             raise ConfigError(
-                f"the control station cannot listen on {self.host} port {self.port}: {reason}",
+                f"the control station cannot listen on {self.host} port {self.port}: {_reason(error)}",
                 remedy="choose another port with --port, or end what listens there",
             ) from None
         self.port = self._runner.addresses[0][1]
@@ -216,6 +216,12 @@ class Station:
 
     async def _hang_up(self, pages: list[web.WebSocketResponse], reason: str) -> None:
         await asyncio.gather(*(hang_up(page, GOING_AWAY, reason) for page in pages), return_exceptions=True)
+
+
+def _reason(error: OSError | OverflowError) -> str:
+    """Without the address, which asyncio puts into the text of its errors."""
+    number = getattr(error, "errno", None) or 0
+    return os.strerror(number) if number > 0 else getattr(error, "strerror", None) or str(error)
 
 
 def _told(error: CanhelmError, status: int) -> web.Response:
