@@ -29,6 +29,13 @@ BUILD = """async paths => {
     });
 }"""
 
+ARCS = """async paths => {
+    const {arcThrough, nextPlace} = await import("/page/path_geometry.js");
+    return paths.map(({path, here, lead_m, exchanged, places: [place]}) =>
+        arcThrough(nextPlace(path, here, exchanged, {lead_m, exchanged}), ...place));
+}"""
+"""Tangent to the path that is there, driven forward whichever way the path is."""
+
 
 def random_piece(dice: random.Random) -> dict[str, Any]:
     """An entry of a path file, good or not."""
@@ -113,3 +120,18 @@ def test_the_page_projects_places_as_the_loops_do(operator: Operator, cases: lis
             assert point == pytest.approx(piece.point(piece.length_m / 3), abs=1e-9)
             for place, (along, offset) in zip(case["places"], found, strict=True):
                 assert (along, offset) == pytest.approx(piece.project(*place), abs=1e-8)
+
+
+def test_an_arc_that_is_added_ends_where_the_map_was_clicked(operator: Operator, cases: list[dict[str, Any]]) -> None:
+    good = [case for case in cases if built_by_the_loops(case) is not None]
+    arcs = operator.page.evaluate(ARCS, good)
+    assert sum(arc is not None for arc in arcs) > len(good) / 2
+    for case, arc in zip(good, arcs, strict=True):
+        if arc is None:
+            continue
+        drive = {"drive": "backward" if case["exchanged"] else "forward"}
+        longer = {**case["path"], "pieces": [*case["path"]["pieces"], {**drive, **arc}]}
+        path = built_by_the_loops({**case, "path": longer})
+        assert path is not None
+        last = path.pieces[-1]
+        assert last.point(last.length_m) == pytest.approx(case["places"][0], abs=1e-6)

@@ -4,7 +4,7 @@ import { font, palette, sharp } from "./canvas.js";
 import { attribute, h, number, redraw, text } from "./dom.js";
 import { niceStep } from "./map_view.js";
 
-export const SPAN_S = 60;
+const SPAN_S = 60;
 const CAPACITY = 2048;
 const GAP_S = 0.5;
 const TICK_S = 10;

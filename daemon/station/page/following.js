@@ -68,13 +68,21 @@ export class Following {
   // --- driving --------------------------------------------------------------------------------------------------
 
   async #drive() {
+    const { robot } = this.station;
     this.#driving = true;
     text(this.result, "");
     this.show();
-    const result = await this.station.attempt(this.station.move(METHOD, this.check().params()), "Path");
+    const told = await this.station.move(METHOD, this.check().params()).then(inWords, (error) => this.#tellEnd(error));
     this.#driving = false;
-    text(this.result, result ? inWords(result) : "The path was not driven to its end.");
+    text(this.result, robot === this.station.robot ? told : "");
     this.show();
+  }
+
+  /** Why it has ended early; that somebody stopped it is no error. */
+  #tellEnd({ message, remedy = "", data }) {
+    const told = `The path was not driven to its end: ${message}`;
+    this.station.say(told, data?.type === "Refused" ? "warning" : "error", remedy);
+    return told;
   }
 
   async #stop() {
@@ -94,6 +102,8 @@ export class Following {
   show() {
     const { exchanged, entries } = this.editor;
     for (const input of this.ways) input.checked = (input.value === "backwards") === exchanged;
+    const noReverse = this.station.shape?.path?.smallest_radius_backward_m === null;
+    allow(this.ways[1], noReverse ? "this vehicle cannot drive backwards" : null);
     const against = this.#against(entries);
     allow(this.driveButton, against);
     this.stopButton.disabled = !this.station.connected;
@@ -118,10 +128,11 @@ export class Following {
     text(this.told, `${way}, ${number(Math.abs(error_m) * 100, 1)} cm beside the path`);
   }
 
-  /** The next robot has another limit. */
+  /** The next robot has other limits. */
   forget() {
     put(this.speed, "");
     text(this.result, "");
+    this.editor.set("exchanged", false);
   }
 }
 

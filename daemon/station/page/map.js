@@ -135,7 +135,7 @@ class MapPanel {
 
   #follow(follows = !this.#follows) {
     this.#follows = follows;
-    attribute(this.followButton, "aria-pressed", follows);
+    attribute(this.followButton, "aria-pressed", String(follows));
     this.#changed();
   }
 
@@ -162,7 +162,7 @@ class MapPanel {
 
   #edited() {
     const { editor, handles } = this;
-    for (const button of this.tools) attribute(button, "aria-pressed", button.dataset.tool === handles.tool);
+    for (const button of this.tools) attribute(button, "aria-pressed", String(button.dataset.tool === handles.tool));
     text(this.directionButton, `New pieces: ${editor.nextBackward ? "backward" : "forward"}`);
     [this.undoButton.disabled, this.redoButton.disabled] = [!editor.undoable, !editor.redoable];
     this.#changed();

@@ -32,7 +32,7 @@ const rounded = (value, digits) => Number(value.toFixed(digits));
  * entries: {kind: "line", length_m, backward} and {kind: "arc", radius_m, arc_deg, backward}, each going on where the
  * one before it ends. start: {x_m, y_m, heading_deg}, or null for a path that begins where the vehicle is.
  */
-export class PathEditor extends EventTarget {
+class PathEditor extends EventTarget {
   #station;
   #state = EMPTY;
   #before = [];
@@ -256,7 +256,7 @@ export class PathEditor extends EventTarget {
 }
 
 /** Where the vehicle's reference point is: of one with a trailer that drives backwards, the trailer's axle. */
-export function referencePoint(status, backward) {
+function referencePoint(status, backward) {
   const vehicle = status?.vehicle;
   const pose = (backward && vehicle?.trailer) || vehicle?.pose || vehicle?.odometry;
   return { x_m: pose?.x_m ?? 0, y_m: pose?.y_m ?? 0, heading_deg: pose?.yaw_deg ?? 0 };

@@ -8,7 +8,7 @@
  * there, its curvature [1/m] (positive bends to the left of travel), and the number of its entry in the path file.
  */
 
-export const STRAIGHT = 1e-9;
+const STRAIGHT = 1e-9;
 export const MAX_GAP_M = 0.005;
 export const MAX_KINK_RAD = 0.5 * Math.PI / 180;
 const ROUNDING_M = 1e-9;
@@ -81,9 +81,6 @@ export function sample(piece, step_rad = 0.05) {
   const parts = Math.max(1, Math.ceil(Math.abs(piece.curvature) * piece.length_m / step_rad));
   return Array.from({ length: parts + 1 }, (_, number) => point(piece, piece.length_m * number / parts));
 }
-
-/** Length of all pieces [m]. */
-export const length = (pieces) => pieces.reduce((sum, piece) => sum + piece.length_m, 0);
 
 /** The arc {arc_deg, radius_m} that leaves a place in a direction of travel and goes through a point.
  *  Null where that is a line, or the point lies behind. */

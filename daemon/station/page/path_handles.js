@@ -39,18 +39,16 @@ export class PathHandles {
   /** Add a piece by the tool, or choose the piece under the pointer. */
   click(x, y, event) {
     const candidate = this.#candidate(x, y, event);
+    this.hovered = null;
     if (candidate) return this.#editor.append(candidate);
     const found = nearest(this.#editor.built().pieces, ...this.#view.toWorld(x, y));
     const reach_m = REACH_PX[event.pointerType] / this.#view.px_m;
     return this.#editor.set("chosen", found && found.distance_m < reach_m ? found.index : null);
   }
 
-  /** Remember what a click here would add; whether that is something else than before. */
+  /** Remember what a click here would add. */
   hover(x, y, event) {
-    const candidate = this.#grabbed || event.buttons ? null : this.#candidate(x, y, event);
-    const changed = JSON.stringify(candidate) !== JSON.stringify(this.hovered);
-    this.hovered = candidate;
-    return changed;
+    this.hovered = this.#grabbed || event.buttons ? null : this.#candidate(x, y, event);
   }
 
   #candidate(x, y, { altKey }) {

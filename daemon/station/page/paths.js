@@ -4,7 +4,7 @@ import { ErrorCharts, SpeedChart } from "./charts.js";
 import { h, redraw } from "./dom.js";
 import { Following } from "./following.js";
 import { PathCheck } from "./path_check.js";
-import { editorOf } from "./path_editor.js";
+import { editorOf, SNAP_DEG, SNAP_M } from "./path_editor.js";
 import { PathFiles } from "./path_files.js";
 import { StartFields } from "./path_start.js";
 import { PathTable } from "./path_table.js";
@@ -71,7 +71,7 @@ class PathsPanel {
       this.start.element,
       this.table.element,
       h("div", { class: "row" }, line, arc, this.undo, this.redo, this.clear),
-      h("label", { class: "tick" }, this.snap, "Snap to 0.1 m and 5°"),
+      h("label", { class: "tick" }, this.snap, `Snap to ${SNAP_M} m and ${SNAP_DEG}°`),
       h("p", { class: "muted" }, HINT),
     );
   }
