@@ -226,5 +226,20 @@ def test_a_slope_rolls_a_robot_that_nobody_holds(operator: Operator, robot: Robo
     operator.go_to("simulation")
     operator.page.fill(f"{SIMULATION} form[aria-label=Slope] input >> nth=0", "15")
     operator.page.click(f"{SIMULATION} >> text=Tilt")
+    operator.sees(SIMULATION, "The floor has a slope of 15°")
     robot.comes_to(lambda status: max(speeds(status)) > 0.02, within_s=10.0)
     operator.page.click("text=Make level")
+    operator.sees(SIMULATION, "The floor is level")
+
+
+def test_the_speed_of_time_is_set_and_told_as_the_daemon_has_it(operator: Operator, robot: Robot) -> None:
+    operator.go_to("simulation")
+    operator.page.select_option("text=Time passes at", "2")
+    operator.sees("#notes", "time passes at 2 × real time")
+    assert robot.status()["pace"] == 2.0
+    operator.go_to("drive")
+    robot.call("simulation.pace", factor=1.0)
+    operator.go_to("simulation")
+    operator.until(
+        lambda: operator.page.input_value("text=Time passes at") == "1", lambda: "it is told as it was set before"
+    )

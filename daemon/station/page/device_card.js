@@ -45,6 +45,10 @@ function head(name, where) {
   return { state, element: h("header", {}, h("h4", {}, name), h("span", { class: "aside" }, where), state) };
 }
 
+function card(label, ...parts) {
+  return h("article", { class: "card", "aria-label": label }, parts);
+}
+
 /** What is wrong with a device, and what to do. */
 function trouble() {
   const what = h("strong");
@@ -89,13 +93,13 @@ export class DriveCard {
     this.jog = new Jog(station, node.name);
     const commands = h("div", { class: "row" }, this.enable, this.disable, this.reset);
     const parts = [this.head.element, this.#trouble.element, this.#facts.element, this.#statusword.element];
-    this.element = h("article", { class: "card", "aria-label": `Drive ${node.name}` }, parts, commands,
-      this.jog.element, this.#why);
+    this.element = card(`Drive ${node.name}`, ...parts, commands, this.jog.element, this.#why);
   }
 
   show(node) {
     const ready = node.node_state === "ready";
-    setBadge(this.head.state, ...(ready ? DRIVE_STATES[node.state] ?? ["warn", node.state] : nodeState(node.node_state)));
+    const powered = DRIVE_STATES[node.state] ?? ["warn", node.state];
+    setBadge(this.head.state, ...(ready ? powered : nodeState(node.node_state)));
     this.#trouble.show(node);
     this.#facts.show({
       Values: ready ? null : LAST,
@@ -195,8 +199,7 @@ export function encoderCard(node) {
       Position: now.position_counts == null ? null : `${now.position_counts} counts`,
     });
   };
-  const label = `Encoder ${node.name}`;
-  return { element: h("article", { class: "card", "aria-label": label }, top.element, wrong.element, facts.element), show };
+  return { element: card(`Encoder ${node.name}`, top.element, wrong.element, facts.element), show };
 }
 
 /** A card of an NXT brick. */
@@ -215,7 +218,7 @@ export function brickCard(brick) {
       Telegrams: now.line ? `${now.line.sent} sent, ${now.line.replies} answered, ${now.line.bad_replies} bad` : null,
     });
   };
-  return { element: h("article", { class: "card", "aria-label": `Brick ${brick.name}` }, top.element, facts.element), show };
+  return { element: card(`Brick ${brick.name}`, top.element, facts.element), show };
 }
 
 /** A card of a brake. */
@@ -228,5 +231,5 @@ export function brakeCard(brake) {
     const times = `${number(now.open_time_s, 2)} s to release, ${number(now.close_time_s, 2)} s to engage`;
     facts.show({ "Switched by": now.drive, Takes: times });
   };
-  return { element: h("article", { class: "card", "aria-label": `Brake ${brake.name}` }, top.element, facts.element), show };
+  return { element: card(`Brake ${brake.name}`, top.element, facts.element), show };
 }

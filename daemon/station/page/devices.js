@@ -6,6 +6,10 @@ import { DriveCard, brakeCard, brickCard, encoderCard, nodeState } from "./devic
 import { h, redraw, seldom, text } from "./dom.js";
 import { Rows, table } from "./rows.js";
 
+function section(title, ...parts) {
+  return h("section", { "aria-label": title }, h("h3", {}, title), parts);
+}
+
 /** A part of the panel that is hidden where this robot has nothing for it. */
 class Part {
   #rows;
@@ -13,7 +17,7 @@ class Part {
 
   constructor(title, make, choose) {
     this.choose = choose;
-    this.element = h("section", { "aria-label": title }, h("h3", {}, title), this.#parent);
+    this.element = section(title, this.#parent);
     this.#rows = new Rows(this.#parent, make);
   }
 
@@ -35,7 +39,7 @@ class Nodes {
 
   constructor() {
     const { table: element, body } = table("Nodes and their guarding", ["Node", "Name", "Device", "Guarding"]);
-    this.element = h("section", { "aria-label": "Nodes" }, h("h3", {}, "Nodes"), h("div", { class: "scroll" }, element));
+    this.element = section("Nodes", h("div", { class: "scroll" }, element));
     this.#rows = new Rows(body, makeNode);
   }
 
@@ -50,14 +54,15 @@ function makeNode(node) {
   const state = badge();
   const cells = [h("td", {}, node.name), h("td", {}, node.device), h("td", {}, state)];
   const element = h("tr", {}, h("th", { scope: "row" }, node.node), cells);
-  const show = ({ node_state }) => setBadge(state, ...(node_state === "ready" ? ["good", "guarded"] : nodeState(node_state)));
+  const guarding = ({ node_state }) => (node_state === "ready" ? ["good", "guarded"] : nodeState(node_state));
+  const show = (now) => setBadge(state, ...guarding(now));
   return { element, show };
 }
 
 /** What a first look at a bus without a profile has found. */
 class Found {
   #list = h("ul");
-  element = h("section", { "aria-label": "Found on the bus" }, h("h3", {}, "Found on the bus"), this.#list);
+  element = section("Found on the bus", this.#list);
   #rows = new Rows(this.#list, makeFound, (row) => row.node);
 
   show({ found }) {
@@ -84,14 +89,14 @@ export function create(station) {
     new Part("Brakes", brakeCard, (status) => status.brakes),
   ];
   const sections = [...parts, new Nodes(), new Found()];
-  const network = h("section", { "aria-label": "Bus and control cycle" }, h("h3", {}, "Bus and control cycle"), bus.element);
+  const network = section("Bus and control cycle", bus.element);
   const none = h("p", {}, "No word from a robot yet.");
   const element = h("section", { class: "devices" }, h("h2", {}, "Devices"), none, sections.map((part) => part.element),
     network);
   const draw = redraw(element, () => {
     none.hidden = Boolean(station.status);
     network.hidden = !station.status;
-    for (const section of sections) section.show(station.status ?? {});
+    for (const each of sections) each.show(station.status ?? {});
     bus.show(station.status ?? {});
   });
   station.on("robot", () => parts.forEach((part) => part.clear()));

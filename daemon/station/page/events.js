@@ -117,7 +117,8 @@ class EventsPanel {
 
   #isWanted({ severity, source, message, remedy }) {
     const wanted = this.#search.value.trim().toLowerCase();
-    return SHOWN[this.#severity.value].includes(severity) && `${source} ${message} ${remedy}`.toLowerCase().includes(wanted);
+    const words = `${source} ${message} ${remedy}`.toLowerCase();
+    return SHOWN[this.#severity.value].includes(severity) && words.includes(wanted);
   }
 
   #filter() {

@@ -49,7 +49,8 @@ export class FaultList {
     const details = more.map(([key, value]) => `${key} ${CODES.includes(key) ? hexadecimal(value) : value}`).join(", ");
     const clear = h("button", { type: "button", onclick: () => this.#clear(fault) }, "Clear");
     clear.setAttribute("aria-label", `Clear fault ${fault}: ${told.kind}`);
-    const what = h("th", { scope: "row" }, `${fault}: ${told.kind}`, details && h("span", { class: "aside" }, ` ${details}`));
+    const aside = details && h("span", { class: "aside" }, ` ${details}`);
+    const what = h("th", { scope: "row" }, `${fault}: ${told.kind}`, aside);
     const cells = [h("td", {}, told.part ?? "any"), h("td", {}, state), struck, h("td", {}, clear)];
     const show = (now) => {
       setBadge(state, STATES[now.state] ?? "warn", now.state);
@@ -107,7 +108,8 @@ export class FaultForm {
     const chosen = this.#kind.value;
     [this.#fields, this.#names] = [fields, names];
     this.#kinds = kinds.filter(({ parts }) => !parts.length || this.#partsOf(parts).length);
-    this.#kind.replaceChildren(...this.#kinds.map(({ kind, summary }) => h("option", { value: kind }, `${kind}: ${summary}`)));
+    const options = this.#kinds.map(({ kind, summary }) => h("option", { value: kind }, `${kind}: ${summary}`));
+    this.#kind.replaceChildren(...options);
     if (this.#kinds.some(({ kind }) => kind === chosen)) this.#kind.value = chosen;
     this.#showFields();
   }

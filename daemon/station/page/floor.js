@@ -16,16 +16,22 @@ export class Slope {
   #direction = h("input", { type: "number", step: 5, min: -180, max: 180, value: 0, required: true });
   #tilt = h("button", { type: "submit" }, "Tilt");
   #level = h("button", { type: "button", onclick: () => this.#makeLevel() }, "Make level");
+  #now = h("p", { role: "status" });
   #why = h("p", { class: "reason" });
+  #changed;
 
-  /** @param {object} station see station.js */
-  constructor(station) {
+  /**
+   * @param {object} station see station.js
+   * @param {function(): void} changed is called when the floor was tilted
+   */
+  constructor(station, changed) {
     this.#station = station;
+    this.#changed = changed;
     const slope = h("label", {}, "Slope ", this.#slope, " °");
     const direction = h("label", {}, "downhill towards ", this.#direction, " °");
     const hint = h("p", { class: "aside" }, "Downhill: 0° along x of the map, 90° along y.");
     this.element = h("form", { "aria-label": "Slope" }, h("div", { class: "row" }, slope, direction, this.#tilt,
-      this.#level), hint, this.#why);
+      this.#level), this.#now, hint, this.#why);
     this.element.addEventListener("submit", (event) => {
       event.preventDefault();
       this.#ask();
@@ -42,6 +48,13 @@ export class Slope {
     attribute(this.#slope, "max", param?.maximum);
   }
 
+  /** @param {{slope_deg: number, direction_deg: number}|undefined} floor as `simulation.look` tells it */
+  show(floor) {
+    const { slope_deg, direction_deg } = floor ?? {};
+    const slopes = `has a slope of ${slope_deg}°, downhill towards ${direction_deg}°`;
+    text(this.#now, floor ? `The floor ${slope_deg ? slopes : "is level"}.` : "");
+  }
+
   #makeLevel() {
     this.#slope.value = 0;
     this.#ask();
@@ -49,8 +62,8 @@ export class Slope {
 
   async #ask() {
     const asked = { slope_deg: Number(this.#slope.value), direction_deg: Number(this.#direction.value) };
-    const tilted = await this.#station.attempt(this.#station.call("simulation.slope", asked), "tilting the floor");
-    if (tilted) this.#station.say(asked.slope_deg ? `the floor has a slope of ${asked.slope_deg}°` : "the floor is level");
+    await this.#station.attempt(this.#station.call("simulation.slope", asked), "tilting the floor");
+    this.#changed();
   }
 }
 
@@ -60,7 +73,7 @@ export class Ice {
   #changed;
   #wheels = [];
   #friction = h("input", { type: "number", min: 0.001, max: 2, step: "any", value: FIRST_FRICTION, required: true });
-  #all = h("button", { type: "button", onclick: () => this.#lay(this.#wheels.filter(({ ice }) => !ice)) }, "All wheels on ice");
+  #all = h("button", { type: "button", onclick: () => this.#layAll() }, "All wheels on ice");
   #none = h("button", { type: "button", onclick: () => this.#takeAway(this.#wheels) }, "Take all ice away");
   #why = h("p", { class: "reason" });
   #rows;
@@ -74,7 +87,8 @@ export class Ice {
     this.#changed = changed;
     const { table: element, body } = table("Ice under the wheels", ["Wheel", "On", "Change"]);
     this.#rows = new Rows(body, (wheel) => this.#row(wheel));
-    const tools = h("div", { class: "row" }, h("label", {}, "Coefficient of friction ", this.#friction), this.#all, this.#none);
+    const friction = h("label", {}, "Coefficient of friction ", this.#friction);
+    const tools = h("div", { class: "row" }, friction, this.#all, this.#none);
     this.element = h("div", {}, tools, h("div", { class: "scroll" }, element), this.#why);
   }
 
@@ -83,7 +97,8 @@ export class Ice {
    * @param {object[]} faults as `simulation.faults` tells them
    */
   show(drives, faults) {
-    const icy = new Map(faults.filter(({ kind, state }) => kind === "ice" && state !== "over").map((ice) => [ice.part, ice]));
+    const laid = faults.filter(({ kind, state }) => kind === "ice" && state !== "over");
+    const icy = new Map(laid.map((ice) => [ice.part, ice]));
     this.#wheels = wheelsOf(this.#station.shape, drives).map((name) => ({ name, ice: icy.get(name) ?? null }));
     this.element.hidden = !this.#wheels.length;
     this.#rows.show(this.#wheels);
@@ -99,11 +114,16 @@ export class Ice {
     const button = h("button", { type: "button", onclick: change });
     const show = (now) => {
       wheel = now;
-      setBadge(on, wheel.ice ? "warn" : "good", wheel.ice ? `ice, friction ${wheel.ice.friction ?? FIRST_FRICTION}` : "dry floor");
+      const { ice } = now;
+      setBadge(on, ice ? "warn" : "good", ice ? `ice, friction ${ice.friction ?? FIRST_FRICTION}` : "dry floor");
       text(button, wheel.ice ? `Take the ice from ${name}` : `Put ${name} on ice`);
       allow(button, this.#station.cannot("simulation.fault"));
     };
     return { element: h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, on), h("td", {}, button)), show };
+  }
+
+  #layAll() {
+    return this.#lay(this.#wheels.filter(({ ice }) => !ice));
   }
 
   /** Wheels that the simulation does not know are left out, where others could be laid on ice. */

@@ -90,7 +90,9 @@ export class Jog {
     const change = held ? "addEventListener" : "removeEventListener";
     document[change]("visibilitychange", this.#letGo);
     window[change]("hashchange", this.#letGo);
-    this.#buttons.forEach((button, at) => attribute(button, "aria-pressed", held?.direction === 2 * at - 1 ? "true" : "false"));
+    const [back, forward] = this.#buttons;
+    attribute(back, "aria-pressed", String(held?.direction === -1));
+    attribute(forward, "aria-pressed", String(held?.direction === 1));
     return held;
   }
 }

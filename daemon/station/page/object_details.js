@@ -146,7 +146,8 @@ class ObjectWriter {
   }
 
   #old() {
-    return this.#station.call("sdo.read", { node: this.node, object: this.entry.object }).then(valueOf, () => "not known");
+    const read = this.#station.call("sdo.read", { node: this.node, object: this.entry.object });
+    return read.then(valueOf, () => "not known");
   }
 
   async #write() {

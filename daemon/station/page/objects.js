@@ -24,7 +24,8 @@ class ObjectsPanel {
     this.#details = new ObjectDetails(station);
     const { table: element, body } = table("Objects of this node", ["Object", "Name", "Access", "Unit"]);
     this.#rows = new Rows(body, (entry) => this.#row(entry), (entry) => entry.object);
-    const tools = h("div", { class: "row" }, h("label", {}, "Node ", this.#node), h("label", {}, "Search ", this.#search));
+    const search = h("label", {}, "Search ", this.#search);
+    const tools = h("div", { class: "row" }, h("label", {}, "Node ", this.#node), search);
     this.#table = h("div", { class: "scroll objects-list" }, element);
     this.element = h("section", { class: "objects" }, h("h2", {}, "Objects"), tools, this.#told, this.#table,
       this.#details.element);
@@ -76,7 +77,8 @@ class ObjectsPanel {
   }
 
   async #objectsOf(device) {
-    const found = await this.#station.attempt(this.#station.call("station.objects", { device }), `objects of ${device}`);
+    const asked = this.#station.call("station.objects", { device });
+    const found = await this.#station.attempt(asked, `objects of ${device}`);
     return found?.objects ?? [];
   }
 

@@ -7,6 +7,7 @@ import { Rows, table } from "./rows.js";
 
 const LOOK_MS = 1000;
 const FACTORS = [0.1, 0.25, 0.5, 1, 2, 4];
+const OTHER = "other";
 
 /** A titled part of the panel. */
 function part(title, ...children) {
@@ -59,30 +60,33 @@ class Power {
 /** Puts the robot onto blocks, and down again. */
 class Blocks {
   #station;
-  #lifted = null;
+  #changed;
   #told = h("span", { role: "status" });
   #up = h("button", { type: "button", onclick: () => this.#lift(true) }, "Put onto blocks");
   #down = h("button", { type: "button", onclick: () => this.#lift(false) }, "Put down");
 
-  constructor(station) {
+  /**
+   * @param {object} station see station.js
+   * @param {function(): void} changed is called when the robot was lifted or put down
+   */
+  constructor(station, changed) {
     this.#station = station;
+    this.#changed = changed;
     this.element = h("div", { class: "row" }, this.#up, this.#down, this.#told);
   }
 
-  /** Ask the simulation how the robot stands. */
-  async look() {
-    const seen = await this.#station.call("simulation.look").catch((error) => ({ error: error.message }));
-    this.#lifted = seen.lifted ?? null;
-    const reason = seen.error ?? this.#station.cannot("simulation.lift");
-    allow(this.#up, reason ?? (this.#lifted ? "it stands on blocks already" : null));
-    allow(this.#down, reason ?? (this.#lifted === false ? "it stands on the floor already" : null));
-    const stands = this.#lifted ? "It stands on blocks, its wheels in the air." : "It stands on the floor.";
+  /** @param {object} seen what `simulation.look` tells, or its `error` */
+  show({ lifted, error }) {
+    const reason = error ?? this.#station.cannot("simulation.lift");
+    allow(this.#up, reason ?? (lifted ? "it stands on blocks already" : null));
+    allow(this.#down, reason ?? (lifted ? null : "it stands on the floor already"));
+    const stands = lifted ? "It stands on blocks, its wheels in the air." : "It stands on the floor.";
     text(this.#told, reason ? `Not now: ${reason}` : stands);
   }
 
   async #lift(lifted) {
     await this.#station.attempt(this.#station.call("simulation.lift", { lifted }), "lifting the robot");
-    this.look();
+    this.#changed();
   }
 }
 
@@ -94,21 +98,32 @@ class Pace {
 
   constructor(station) {
     this.#station = station;
-    const options = FACTORS.map((factor) => h("option", { value: factor, selected: factor === 1 }, `${factor} ×`));
+    const options = FACTORS.map((factor) => h("option", { value: factor }, `${factor} ×`));
     this.#factor = h("select", { onchange: () => this.#ask() }, options);
     this.element = h("div", {}, h("label", {}, "Time passes at ", this.#factor, " of real time"), this.#why);
   }
 
-  look() {
+  /** @param {number} pace as `status` tells it */
+  show(pace = 1) {
     const reason = this.#station.cannot("simulation.pace");
     allow(this.#factor, reason);
     text(this.#why, reason ? `Speed of time: ${reason}` : "");
+    if (document.activeElement === this.#factor) return;
+    if (!FACTORS.includes(pace)) text(this.#other(), `${pace} ×`);
+    this.#factor.value = FACTORS.includes(pace) ? pace : OTHER;
+  }
+
+  /** The choice that stands for a factor which somebody else has set. */
+  #other() {
+    const other = this.#factor.querySelector(`[value=${OTHER}]`) ?? h("option", { value: OTHER, disabled: true });
+    if (!other.parentNode) this.#factor.append(other);
+    return other;
   }
 
   async #ask() {
     const factor = Number(this.#factor.value);
     const set = await this.#station.attempt(this.#station.call("simulation.pace", { factor }), "speed of time");
-    if (set) this.#station.say(`time passes at ${factor} × real time`);
+    if (set) this.#station.say(`time passes at ${set.factor} × real time`);
   }
 }
 
@@ -130,12 +145,12 @@ class SimulationPanel {
 
   constructor(station) {
     this.#station = station;
-    const changed = () => this.#lookAtFaults();
+    const changed = () => this.#look();
     this.#list = new FaultList(station, changed);
     this.#form = new FaultForm(station, changed);
     this.#ice = new Ice(station, changed);
-    [this.#slope, this.#power] = [new Slope(station), new Power(station)];
-    [this.#blocks, this.#pace] = [new Blocks(station), new Pace(station)];
+    [this.#slope, this.#power] = [new Slope(station, changed), new Power(station)];
+    [this.#blocks, this.#pace] = [new Blocks(station, changed), new Pace(station)];
     this.#tools = h("div", {}, part("Speed of time", this.#pace.element),
       part("Floor", this.#slope.element, this.#ice.element), part("Blocks", this.#blocks.element),
       part("Faults", this.#list.element, this.#form.element), part("Power", this.#power.element));
@@ -144,7 +159,7 @@ class SimulationPanel {
     station.on("status", seldom(this.#draw));
     for (const kind of ["shape", "connected", "robot"]) station.on(kind, this.#draw);
     station.on("robot", () => (this.#faults = []));
-    addEventListener("hashchange", () => this.#look());
+    addEventListener("hashchange", () => setTimeout(() => this.#look()));
     setInterval(() => this.#look(), LOOK_MS);
   }
 
@@ -156,7 +171,8 @@ class SimulationPanel {
     const status = this.#station.status ?? {};
     const names = namesOf(status);
     this.#offer(names);
-    for (const each of [this.#form, this.#slope, this.#pace]) each.look();
+    for (const each of [this.#form, this.#slope]) each.look();
+    this.#pace.show(status.pace);
     this.#list.show(this.#faults);
     this.#ice.show(names.drives, this.#faults);
     this.#power.show(status);
@@ -166,15 +182,12 @@ class SimulationPanel {
   async #look() {
     const { connected, shape } = this.#station;
     if (this.element.closest("[hidden]") || document.hidden || !connected || !shape?.simulated) return;
-    this.#blocks.look();
-    await this.#lookAtFaults();
-    this.#kinds ??= await this.#station.call("station.fault_kinds").catch(() => null);
-    this.#draw();
-  }
-
-  async #lookAtFaults() {
+    const seen = await this.#station.call("simulation.look").catch(({ message }) => ({ error: message }));
+    this.#blocks.show(seen);
+    this.#slope.show(seen.floor);
     const told = await this.#station.call("simulation.faults").catch(() => null);
-    if (told) this.#faults = told.faults;
+    this.#faults = told?.faults ?? this.#faults;
+    this.#kinds ??= await this.#station.call("station.fault_kinds").catch(() => null);
     this.#draw();
   }
 
