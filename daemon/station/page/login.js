@@ -22,7 +22,7 @@ async function lookForRobots(station) {
   try {
     const { login_needed, role } = await fetched("session");
     document.getElementById("logout").hidden = !login_needed || !role;
-    showLogin(login_needed && !role);
+    showLogin(station, login_needed && !role);
     if (login_needed && !role) return;
     offer(station, (await fetched("robots")).robots);
   } catch {
@@ -63,13 +63,13 @@ export function choose(station, robot) {
   station.choose(robot);
 }
 
-function showLogin(needed) {
+function showLogin(station, needed) {
   const section = document.getElementById("login");
-  if (needed && section.hidden) section.replaceChildren(...form(section));
+  if (needed && section.hidden) section.replaceChildren(...form(station));
   section.hidden = !needed;
 }
 
-function form(section) {
+function form(station) {
   const token = h("input", { id: "token", type: "password", autocomplete: "current-password", required: true });
   const trouble = h("p", { class: "bad", role: "alert" });
   const send = h("button", { type: "submit", class: "main" }, "Log in");
@@ -79,7 +79,7 @@ function form(section) {
     send.disabled = true;
     trouble.textContent = await logIn(token.value);
     send.disabled = false;
-    section.hidden = !trouble.textContent;
+    if (!trouble.textContent) await lookForRobots(station);
   });
   return [
     h("h2", { id: "login-title" }, "Log in"),
@@ -92,7 +92,7 @@ function form(section) {
 async function logOut(station) {
   station.choose(null);
   await station.attempt(fetch("logout", { method: "POST" }), "logging out");
-  showLogin(true);
+  showLogin(station, true);
 }
 
 /** What went wrong, for people; empty where the login is done. */
