@@ -98,7 +98,7 @@ class MapPanel {
       grab: (x, y, event) => !this.active.pieces && handles.grab(x, y, event),
       drag: (x, y, event) => handles.drag(x, y, event),
       drop: () => handles.drop(),
-      click: (x, y, event) => this.active.pieces || handles.click(x, y, event),
+      click: (x, y, event) => this.active.pieces || this.#click(x, y, event),
       hover: (x, y, event) => this.#hover(x, y, event),
       leave: () => this.#leave(),
       moved: (zoomed) => this.#moved(zoomed),
@@ -109,6 +109,11 @@ class MapPanel {
     this.handles.tool = tool;
     this.handles.hovered = null;
     this.#edited();
+  }
+
+  #click(x, y, event) {
+    if (this.handles.click(x, y, event)) return;
+    this.station.say(`No ${this.handles.tool} leads there`, "info", "it goes on where the path ends, in its direction");
   }
 
   #hover(x, y, event) {

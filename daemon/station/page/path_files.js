@@ -135,14 +135,13 @@ export class PathFiles {
     const [file] = this.file.files;
     this.file.value = "";
     if (!file) return;
-    const path = asPath(await file.text());
-    if (!path) {
+    try {
+      this.#take(JSON.parse(await file.text()), `${file.name} is in the editor.`);
+      this.name.value = file.name.replace(/\.\w+$/, "").replace(/[^A-Za-z0-9_-]/g, "-");
+    } catch {
       const remedy = "give a path as JSON, such as Export writes it; YAML files go into the robot's folder of paths";
       this.station.say(`${file.name} is no path`, "error", remedy);
-      return;
     }
-    this.name.value = file.name.replace(/\.\w+$/, "").replace(/[^A-Za-z0-9_-]/g, "-");
-    this.#take(path, `${file.name} is in the editor.`);
   }
 
   /** JSON is YAML, too: `canhelm drive path` reads it. */
@@ -183,15 +182,4 @@ export class PathFiles {
 
 function titled(name, length_m) {
   return length_m == null ? name : `${name} (${length_m.toFixed(1)} m)`;
-}
-
-/** The path in a text, or null where there is none. */
-function asPath(content) {
-  try {
-    const path = JSON.parse(content);
-    const good = Array.isArray(path?.pieces) && path.pieces.every((piece) => piece && typeof piece === "object");
-    return good ? path : null;
-  } catch {
-    return null;
-  }
 }

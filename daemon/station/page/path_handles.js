@@ -36,14 +36,19 @@ export class PathHandles {
     this.#grabbed = null;
   }
 
-  /** Add a piece by the tool, or choose the piece under the pointer. */
+  /** Add a piece by the tool, or choose the piece under the pointer; false where the tool finds no way there. */
   click(x, y, event) {
     const candidate = this.#candidate(x, y, event);
     this.hovered = null;
-    if (candidate) return this.#editor.append(candidate);
+    if (candidate) this.#editor.append(candidate);
+    else if (this.tool === "move") this.#choose(x, y, event.pointerType);
+    return Boolean(candidate) || this.tool === "move";
+  }
+
+  #choose(x, y, pointerType) {
     const found = nearest(this.#editor.built().pieces, ...this.#view.toWorld(x, y));
-    const reach_m = REACH_PX[event.pointerType] / this.#view.px_m;
-    return this.#editor.set("chosen", found && found.distance_m < reach_m ? found.index : null);
+    const reach_m = (REACH_PX[pointerType] ?? REACH_PX.mouse) / this.#view.px_m;
+    this.#editor.set("chosen", found && found.distance_m < reach_m ? found.index : null);
   }
 
   /** Remember what a click here would add. */

@@ -78,6 +78,7 @@ export class PathTable {
   /** Take a piece away; the focus goes to the one that comes in its place. */
   #remove(index) {
     this.editor.remove(index);
+    this.show();
     const buttons = this.element.querySelectorAll("tbody button");
     buttons[Math.min(index, buttons.length - 1)]?.focus();
   }
