@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from canhelm import protocol
-from canhelm.errors import DaemonNotRunning
+from canhelm.errors import DaemonNotRunning, UsageError
 from daemon.runs import store
 
 
@@ -42,7 +42,7 @@ class Robots:
     def __init__(self, names: Collection[str] = ()) -> None:
         self._names = tuple(dict.fromkeys(names))
         for name in self._names:
-            protocol.choose_socket(robot=name)
+            _socket(name)
 
     def find(self, name: str) -> Robot:
         """A robot by its name.
@@ -51,16 +51,23 @@ class Robots:
             UsageError: the name is none.
             DaemonNotRunning: there is no such robot, or this station does not offer it.
         """
-        socket = protocol.choose_socket(robot=name)
+        socket = _socket(name)
         if self._names and name not in self._names:
             raise DaemonNotRunning(f"this station has no robot {name}", remedy=f"choose {' or '.join(self._names)}")
         return Robot(name, socket, _state_folder(name, socket))
 
     async def told(self) -> list[dict[str, object]]:
         """Name of each robot, and whether its daemon answers."""
-        sockets = {name: protocol.choose_socket(robot=name) for name in self._names} or _sockets()
+        sockets = {name: _socket(name) for name in self._names} or _sockets()
         live = await asyncio.to_thread(lambda: [protocol.is_live(socket) for socket in sockets.values()])
         return [{"name": name, "alive": alive} for name, alive in zip(sockets, live, strict=True)]
+
+
+def _socket(name: str) -> Path:
+    """Where a robot's daemon listens. Raises UsageError for what is no name."""
+    if not name:
+        raise UsageError("a robot has a name", remedy="give it with --robot")
+    return protocol.choose_socket(robot=name)
 
 
 def _sockets() -> dict[str, Path]:
