@@ -17,6 +17,8 @@ CARD = f"article[aria-label='Drive {DRIVE}']"
 FORWARD = f"{CARD} button.hold:last-of-type"
 OBJECTS, SIMULATION = "[data-panel=objects]", "[data-panel=simulation]"
 RAMP = "0x6083"
+CONNECT_ANEW = "import('/page/station.js').then(({station}) => (station.choose(null), station.choose('max2d')))"
+HAS_STATUS = "import('/page/station.js').then(({station}) => station.status !== null)"
 
 
 def turning(status: Status) -> bool:
@@ -138,11 +140,9 @@ def test_events_of_an_earlier_connection_are_kept_once(operator: Operator) -> No
     operator.go_to("events")
     operator.sees("[data-panel=events]", "configured, started and guarded")
     before = operator.page.locator("ol.events li").count()
-    operator.page.evaluate(
-        "import('/page/station.js').then(({station}) => (station.choose(null), station.choose('max2d')))"
-    )
+    operator.page.evaluate(CONNECT_ANEW)
     operator.sees("#connection", "connected")
-    operator.page.wait_for_function("import('/page/station.js').then(({station}) => station.status !== null)")
+    operator.until(lambda: operator.page.evaluate(HAS_STATUS), lambda: "no status came")
     assert operator.page.locator("ol.events li").count() == before
 
 
