@@ -107,6 +107,12 @@ async def test_a_car_without_reverse_says_so() -> None:
         assert told["path"]["smallest_radius_backward_m"] is None
 
 
+@pytest.mark.parametrize(("name", "lead_m"), [("semitrailer", 0.602), ("ackermann", 0.0), ("max2d", 0.0)])
+async def test_a_map_knows_how_far_the_path_jumps_where_the_driving_direction_changes(name: str, lead_m: float) -> None:
+    async with running_robot(load(name).profile) as robot:
+        assert (await shape(robot))["path"]["lead_m"] == pytest.approx(lead_m)
+
+
 @pytest.mark.parametrize("name", ["semitrailer", "ackermann"])
 async def test_an_arc_of_the_smallest_radius_is_a_path_and_a_narrower_one_is_none(name: str) -> None:
     async with running_robot(load(name).profile) as robot:

@@ -62,7 +62,8 @@ export class Following {
     const { limits } = this.station.shape ?? {};
     const fastest = this.editor.exchanged && limits?.backward_m_s ? limits.backward_m_s : limits?.speed_m_s;
     const speed_m_s = Math.min(this.speed_m_s() ?? Infinity, fastest ?? Infinity);
-    return Number.isFinite(speed_m_s) && speed_m_s > 0 ? `at least ${number(length_m / speed_m_s, 0)} s` : "";
+    const least_s = length_m / speed_m_s;
+    return least_s > 0 ? `at least ${number(least_s, least_s < 10 ? 1 : 0)} s` : "";
   }
 
   // --- driving --------------------------------------------------------------------------------------------------

@@ -50,15 +50,16 @@ function drawPart(context, view, colours, { outline_m }, pose) {
   context.stroke();
 }
 
+/** A function that takes points of a wheel's frame to that of its part: a steered wheel turns about its pivot. */
+function onPart({ name, x_m, y_m, pivot_x_m = x_m, pivot_y_m = y_m }, vehicle) {
+  const turned = placed({ x_m: pivot_x_m, y_m: pivot_y_m, yaw_deg: vehicle.wheels_deg?.[name] ?? 0 });
+  return ([x, y]) => turned([x_m - pivot_x_m + x, y_m - pivot_y_m + y]);
+}
+
 function drawWheel(context, view, colours, wheel, vehicle) {
-  const turned = radians(vehicle.wheels_deg?.[wheel.name] ?? 0);
-  const [cos, sin] = [Math.cos(turned), Math.sin(turned)];
   const half = Math.max(wheel.width_m / 2, WHEEL_LEAST_PX / 2 / view.px_m);
-  const corners = [[1, 1], [1, -1], [-1, -1], [-1, 1]].map(([along, aside]) => {
-    const [x, y] = [along * wheel.radius_m, aside * half];
-    return [wheel.x_m + x * cos - y * sin, wheel.y_m + x * sin + y * cos];
-  });
-  view.trace(context, corners.map(placed(poseOf(wheel.part, vehicle))));
+  const corners = [[1, 1], [1, -1], [-1, -1], [-1, 1]].map(([x, y]) => [x * wheel.radius_m, y * half]);
+  view.trace(context, corners.map(onPart(wheel, vehicle)).map(placed(poseOf(wheel.part, vehicle))));
   context.closePath();
   [context.fillStyle, context.strokeStyle, context.lineWidth] = [colours.ink, colours.accent, 1.5];
   if (!wheel.driven) context.fillStyle = colours.muted;
@@ -75,7 +76,7 @@ function drawCentre(context, view, colours, wheels, vehicle) {
   [context.strokeStyle, context.lineWidth] = [colours.series[1], 1];
   context.setLineDash([3, 4]);
   for (const wheel of wheels.filter(({ part }) => part === "body")) {
-    view.trace(context, [centre, onMap([wheel.x_m, wheel.y_m])]);
+    view.trace(context, [centre, onMap(onPart(wheel, vehicle)([0, 0]))]);
     context.stroke();
   }
   context.setLineDash([]);
