@@ -10,6 +10,7 @@ import msgspec
 import pytest
 
 from canhelm.errors import Refused
+from daemon.runtime.simulation_commands import SimulationCommands
 from drivers.simulated.body import GRAVITY_M_S2, BodyWorld
 from drivers.simulated.network import make_world
 from drivers.simulated.omni import OmniWorld
@@ -175,3 +176,14 @@ async def test_a_robot_whose_wheels_turn_in_the_air_has_no_floor_to_tilt() -> No
     async with running_robot(load("nxt").profile) as robot:
         with pytest.raises(Refused, match="stands on no floor"):
             await robot.call("simulation.slope", slope_deg=3.0, direction_deg=0.0)
+
+
+@pytest.mark.parametrize(
+    ("method", "params"),
+    [("simulation.slope", {"slope_deg": 3.0, "direction_deg": 0.0}), ("simulation.pace", {"factor": 2.0})],
+)
+async def test_on_a_real_network_it_is_refused(method: str, params: dict[str, float]) -> None:
+    async with running_robot() as robot:
+        real = SimulationCommands(robot.app.supervisor, None)
+        with pytest.raises(Refused, match="this network is real"):
+            await real.handlers[method](params, None)
