@@ -144,7 +144,7 @@ export class FaultForm {
     const hint = h("small", { id: `fault-${name}` }, doc);
     input.setAttribute("aria-describedby", hint.id);
     this.#inputs.set(name, input);
-    const label = `${name.replace(/_(s|deg)$/, "").replaceAll("_", " ")}${unit ? ` in ${unit}` : ""}`;
+    const label = `${name.replace(/_(s|deg)$/, "").replaceAll("_", " ")}${unit ? ` (${unit})` : ""}`;
     return h("div", { class: "field" }, h("label", {}, needed ? `${label} (needed) ` : `${label} `, input), hint);
   }
 
