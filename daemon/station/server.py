@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from aiohttp import web
+from aiohttp.http import HttpProcessingError
 
 from canhelm import __version__, protocol
 from canhelm.errors import CanhelmError, ConfigError, DaemonNotRunning, PermissionRefused, Refused, UsageError
@@ -54,7 +55,7 @@ class Station:
         self._guard = Guard(host)
         self._pages: dict[web.WebSocketResponse, str | None] = {}
         self._files = {path.name for path in PAGE.iterdir() if path.is_file()}
-        self._runner = web.AppRunner(self._app(), access_log=None, shutdown_timeout=FAREWELL_S)
+        self._runner = web.AppRunner(self._app(), access_log=None, logger=_defects(), shutdown_timeout=FAREWELL_S)
 
     @property
     def url(self) -> str:
@@ -111,6 +112,8 @@ class Station:
             return _told(error, code)
         except web.HTTPError as error:
             return _told(UsageError(f"{request.path[:80]}: {error.reason}"), error.status)
+        except ConnectionError:  # it hung up before it was answered
+            return web.Response(status=400)
 
     # -- the page -----------------------------------------------------------------------------------------------------
 
@@ -216,6 +219,17 @@ class Station:
 
     async def _hang_up(self, pages: list[web.WebSocketResponse], reason: str) -> None:
         await asyncio.gather(*(hang_up(page, GOING_AWAY, reason) for page in pages), return_exceptions=True)
+
+
+def _defects() -> logging.Logger:
+    """What aiohttp's server tells its errors to: those of strangers who speak no HTTP, or hang up, are none of ours."""
+    logger = LOGGER.getChild("http")
+    logger.addFilter(_is_ours)
+    return logger
+
+
+def _is_ours(record: logging.LogRecord) -> bool:
+    return not isinstance(record.exc_info[1] if record.exc_info else None, HttpProcessingError | ConnectionError)
 
 
 def _reason(error: OSError | OverflowError) -> str:
