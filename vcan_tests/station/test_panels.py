@@ -20,6 +20,12 @@ RAMP = "0x6083"
 CONNECT_ANEW = "import('/page/station.js').then(({station}) => (station.choose(null), station.choose('max2d')))"
 HAS_STATUS = "import('/page/station.js').then(({station}) => station.status !== null)"
 
+MANY_EVENTS = """import('/page/events.js').then(({EventLog}) => {
+    const log = new EventLog();
+    for (let at = 1; at <= 700; at++) log.add({time_s: at, source: "a", message: "b"}, "max2d", at);
+    return log.events.map(({at_ms}) => at_ms);
+})"""
+
 
 def turning(status: Status) -> bool:
     """Whether the drive turns as fast as a jog asks for at first."""
@@ -144,6 +150,12 @@ def test_events_of_an_earlier_connection_are_kept_once(operator: Operator) -> No
     operator.sees("#connection", "connected")
     operator.until(lambda: operator.page.evaluate(HAS_STATUS), lambda: "no status came")
     assert operator.page.locator("ol.events li").count() == before
+
+
+def test_the_newest_500_events_are_kept(operator: Operator) -> None:
+    operator.go_to("events")
+    times = operator.page.evaluate(MANY_EVENTS)
+    assert times == list(range(700, 200, -1))
 
 
 def chooses(operator: Operator, words: str) -> None:

@@ -51,7 +51,7 @@ export class FaultList {
     clear.setAttribute("aria-label", `Clear fault ${fault}: ${told.kind}`);
     const aside = details && h("span", { class: "aside" }, ` ${details}`);
     const what = h("th", { scope: "row" }, `${fault}: ${told.kind}`, aside);
-    const cells = [h("td", {}, told.part ?? "any"), h("td", {}, state), struck, h("td", {}, clear)];
+    const cells = [h("td", {}, told.part ?? "–"), h("td", {}, state), struck, h("td", {}, clear)];
     const show = (now) => {
       setBadge(state, STATES[now.state] ?? "warn", now.state);
       text(struck, now.struck);
