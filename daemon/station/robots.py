@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import os
-import stat
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
@@ -85,7 +84,7 @@ def _sockets_in(folder: Path) -> list[Path]:
 
 
 def _is_api(path: Path) -> bool:
-    return not path.name.endswith(protocol.GATEWAY_SUFFIX) and stat.S_ISSOCK(path.lstat().st_mode)
+    return not path.name.endswith(protocol.GATEWAY_SUFFIX) and path.is_socket()
 
 
 def _state_folder(name: str, socket: Path) -> Path:
