@@ -116,7 +116,9 @@ def test_a_fault_is_told_with_its_cure_and_counted_on_the_tab(
     )
     operator.go_to("events")
     operator.sees("ol.events", r"error\s+max2d: front_left\s+.*over-temperature")
-    assert operator.page.get_attribute("[data-tab=events]", "data-unread") is None
+    operator.until(
+        lambda: operator.page.get_attribute("[data-tab=events]", "data-unread") is None, lambda: "they are still new"
+    )
 
 
 def test_a_node_without_power_is_told_as_lost_and_its_values_as_old(
