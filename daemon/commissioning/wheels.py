@@ -21,6 +21,8 @@ LEAST_SHARE = 0.2
 """Share of the commanded way, and of a turn by hand, below which a wheel has not turned."""
 TOLERANCE = 0.015
 """Of the counts of one turn by hand: five degrees. An encoder of 512 pulses differs from one of 500 by 0.024."""
+DOUBTFUL = 0.1
+"""Share by which a gear has to differ from the profile's until a turn that was no whole one is the likelier cause."""
 QUESTION = "which wheel turned, and which way? forward, backward or none; another wheel as `NAME forward`"
 Values = dict[tuple[str, ...], Any]
 
@@ -117,15 +119,39 @@ async def look_at_wheel(
         return Seen(drive, wheel, forward, moved)
     for brake in brakes:
         await daemon.call("brake.release", pair=brake, force=True)
-    turn_qc = await _turned_by_hand(daemon, person, drive, wheel, _expected_qc(wheels[wheel]))
+    fitted = wheels[wheel]
+    turn_qc, pulses = await _counts_of_a_turn(daemon, person, drive, wheel, fitted)
     for brake in brakes:
         await daemon.call("brake.engage", pair=brake)
-    fitted, pulses = wheels[wheel], wheels[wheel].encoder_pulses_per_turn
-    if turn_qc and not _fits(turn_qc, fitted, pulses):
-        person.tell(f"{abs(turn_qc)} counts a turn of {wheel}, and the profile says {_expected_qc(fitted):.0f}")
-        pulses = round(await number(person, "pulses a turn on the label of its encoder", pulses))
     radius_m = await number(person, f"diameter of wheel {wheel} in mm", 2e3 * fitted.wheel_radius_m) / 2e3
     return Seen(drive, wheel, forward, moved, turn_qc, pulses, radius_m)
+
+
+async def _counts_of_a_turn(
+    daemon: Daemon, person: Person, drive: str, wheel: str, config: DriveConfig
+) -> tuple[int, int]:
+    """Counts of one turn by hand, 0 where there are hardly any, and the pulses of the encoder.
+
+    A gear that is far from the profile's is doubted: half a turn looks like half the gear.
+    """
+    while True:
+        turn_qc = await _turned_by_hand(daemon, person, drive, wheel, _expected_qc(config))
+        pulses = config.encoder_pulses_per_turn
+        if not turn_qc or _fits(turn_qc, config, pulses):
+            return turn_qc, pulses
+        person.tell(f"{abs(turn_qc)} counts a turn of {wheel}, and the profile says {_expected_qc(config):.0f}")
+        pulses = round(await number(person, "pulses a turn on the label of its encoder", pulses))
+        ratio = _ratio(turn_qc, pulses)
+        if abs(ratio / config.total_ratio - 1.0) <= DOUBTFUL:
+            return turn_qc, pulses
+        person.tell(f"that is {ratio:.4g} motor turns a turn of {wheel}, and the profile says {config.total_ratio:.4g}")
+        if await agrees(person, f"was it exactly one whole turn of {wheel}? Else it is turned again"):
+            return turn_qc, pulses
+
+
+def _ratio(turn_qc: int, pulses: int) -> float:
+    """Motor turns per wheel turn."""
+    return abs(turn_qc) / (4 * pulses)
 
 
 async def _turned_by_hand(daemon: Daemon, person: Person, drive: str, wheel: str, expected_qc: float) -> int:
@@ -199,7 +225,7 @@ def _judge_size(seen: Seen, config: DriveConfig, findings: Findings) -> None:
         findings.wrong.append(f"counts: {wheel} has an encoder of {seen.pulses} pulses, not {pulses}")
         findings.values["drives", wheel, "encoder_pulses_per_turn"] = seen.pulses
     if not _fits(seen.turn_qc, config, seen.pulses):
-        ratio = abs(seen.turn_qc) / (4 * seen.pulses)
+        ratio = _ratio(seen.turn_qc, seen.pulses)
         findings.wrong.append(f"gear: {wheel} has {ratio:.4g} motor turns a wheel turn, not {config.total_ratio:.4g}")
         findings.values["drives", wheel, "belt_ratio"] = round(ratio / config.gear_ratio, 4)
     if not math.isclose(seen.radius_m, config.wheel_radius_m, rel_tol=1e-4):
