@@ -87,6 +87,24 @@ async def test_a_gear_within_a_tenth_of_the_profiles_is_not_doubted(tmp_path: Pa
         assert not any(heard.startswith("was it exactly") for heard in shop.person.heard)
 
 
+@pytest.mark.parametrize(
+    ("question", "wrong", "told"),
+    [
+        ("diameter", "2000", "2000 mm do not go with the profile: drives.rear_left."),
+        ("pulses", "0.3", "'0.3' is no number from 16 to 7500"),
+    ],
+)
+async def test_what_the_profile_cannot_take_is_told_at_the_question_and_asked_for_again(
+    question: str, wrong: str, told: str, tmp_path: Path
+) -> None:
+    built = robot_file(tmp_path / "built", "drives: {rear_left: {encoder_pulses_per_turn: 512}}")
+    async with workshop(robot_file(tmp_path / "mine"), built) as shop:
+        shop.person.labels, shop.person.mistaken = {"rear_left": 512}, {question: wrong}
+        findings = await shop.commission("rear_left")
+        assert findings.values == {("drives", "rear_left", "encoder_pulses_per_turn"): 512}
+        assert any(heard.startswith(told) for heard in shop.person.heard)
+
+
 async def test_a_robot_that_is_built_as_its_profile_says_changes_nothing(tmp_path: Path) -> None:
     async with workshop(robot_file(tmp_path)) as shop:
         findings = await shop.commission()
