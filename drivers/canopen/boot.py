@@ -235,7 +235,7 @@ class NodeBoot:
         self._device.sdo.give_up("restarted")
 
     def _on_guarding_answer(self, toggle: int, state: int) -> None:
-        alternates = self._guard.answer(toggle, asyncio.get_running_loop().time())
+        alternates = self._guard.answer(toggle)
         if not alternates:
             self._master.counters.toggle_errors += 1
             if not self._wrong_toggle:
@@ -250,9 +250,11 @@ class NodeBoot:
             words = STATE_WORDS.get(state, f"in state {state}")
             self._leave("lost", f"{self._who} is no longer operational but {words}", "it is configured again by itself")
 
-    def _on_lost(self, silent_s: float) -> None:
-        message = f"{self._who} is lost: no guarding answer for {silent_s * 1e3:.0f} ms"
-        self._leave("lost", message, "check its motor power and the CAN cable; it is configured again when it is back")
+    def _on_lost(self, awaited_s: float) -> None:
+        why = f"no guarding answer for {awaited_s * 1e3:.0f} ms" if awaited_s else "the gateway waited for it in vain"
+        message = f"{self._who} is lost: {why}"
+        remedy = "check its motor power and the CAN cable; it is configured again when it is back"
+        self._leave("lost", message, remedy)
 
     def _leave(self, kind: str, message: str, remedy: str, severity: str = "error") -> None:
         """The node was ready and is no longer. One that is held by command is guarded on, for it guards its life."""
