@@ -116,10 +116,15 @@ class NodeBoot:
                 self._sign_of_life.clear()
             elif not self._sign_of_life.is_set():
                 self._device.node_state = NodeState.ABSENT
-                lacks = "no SDO answer since its boot-up; is it still powered?" if self._booted else NO_BOOT_UP
-                self._say("waiting", f"waiting for {self._who}: {lacks}")
+                self._say("waiting", f"waiting for {self._who}: {self._lacks()}")
             await self._pause(pause_s)
             pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
+
+    def _lacks(self) -> str:
+        """Why the node is not there: the interface where that does not work, else what is not heard of the node."""
+        if self._master.bus.trouble is not None:
+            return self._master.bus.trouble.message
+        return "no SDO answer since its boot-up; is it still powered?" if self._booted else NO_BOOT_UP
 
     async def _answers(self) -> bool:
         """Take the node to pre-operational, alone, and see whether it answers (a stopped node would not)."""
@@ -254,6 +259,9 @@ class NodeBoot:
         why = f"no guarding answer for {awaited_s * 1e3:.0f} ms" if awaited_s else "the gateway waited for it in vain"
         message = f"{self._who} is lost: {why}"
         remedy = "check its motor power and the CAN cable; it is configured again when it is back"
+        trouble = self._master.bus.trouble
+        if trouble is not None:  # then the node is not to blame
+            message, remedy = f"{trouble.message}; {message}", trouble.remedy or ""
         self._leave("lost", message, remedy)
 
     def _leave(self, kind: str, message: str, remedy: str, severity: str = "error") -> None:
