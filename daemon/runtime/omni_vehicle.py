@@ -18,7 +18,7 @@ from daemon.loops.planner import FARTHEST, PlanarLimits, PlanarState
 from daemon.loops.slip import THRESHOLD_M_S2
 from daemon.loops.traction import Traction, TractionTuning
 from daemon.runtime.motions import Motion
-from daemon.runtime.omni_motions import GoalMotion, OmniMotion, TwistMotion
+from daemon.runtime.omni_motions import GoalMotion, OmniMotion, TwistMotion, longest_drive_s
 from daemon.runtime.poses import place_and_yaw
 from daemon.runtime.rest import AT_REST_M_S
 from daemon.runtime.streams import streamed
@@ -140,13 +140,16 @@ class OmniVehicle(Vehicle):
         self._check(goal, limits)
         guide: Guide
         jerk, traction = self.profile.limits.jerk_m_s3, self._new_traction(limits.acceleration)
+        longest_s = math.inf
         if published:
             guide = PublishedGuide(goal, limits, self._period_s, signals, threshold_m_s2)
+            here = self.senses.pose
+            longest_s = longest_drive_s(math.hypot(goal.x - here.x_m, goal.y - here.y_m), limits)
         elif jerk is not None:
             guide = JerkLimitedGuide(goal, limits, jerk, self._period_s, traction)
         else:
             guide = GoalGuide(goal, limits, traction)
-        return GoalMotion(kind, self._names, lease, self.senses, self._law(guide), goal)
+        return GoalMotion(kind, self._names, lease, self.senses, self._law(guide), goal, longest_s)
 
     def _to(self, params: dict[str, Any], lease: str | None) -> Motion:
         heading, speed = params.get("heading_deg"), params.get("speed_m_s")
@@ -155,7 +158,12 @@ class OmniVehicle(Vehicle):
             params["x_m"], params["y_m"], yaw, params.get("end_vx_m_s", 0.0), params.get("end_vy_m_s", 0.0)
         )
         limits = self.limits if speed is None else replace(self.limits, speed=float(speed))
-        return self.to_goal(goal, limits, lease, published=params.get("planner") == "published")
+        published = params.get("planner") == "published"
+        if published and (heading is not None or goal.vx or goal.vy):
+            what = "turns no robot" if heading is not None else "drives to a goal with a velocity again and again"
+            remedy = "leave the planner (--published) out, or give a place alone"
+            raise UsageError(f"the published planner {what}", object="planner", remedy=remedy)
+        return self.to_goal(goal, limits, lease, published=published)
 
     def _parallel(self, params: dict[str, Any], lease: str | None) -> Motion:
         """The way that speed and duration make, as a goal."""

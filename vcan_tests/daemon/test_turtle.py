@@ -284,13 +284,6 @@ async def test_without_ice_nothing_slips_and_the_safety_factor_stays() -> None:
             assert (result["slip_steps"], result["least_safety_factor"]) == (0, 1.0)
 
 
-async def test_the_published_planner_drives_there_too() -> None:
-    async with running_robot(TURTLE) as robot:
-        result = await robot.call("drive.to", x_m=1.0, y_m=0.5, planner="published")
-        assert result["result"] == "arrived"
-        assert math.dist(pose_of(robot)[:2], (1.0, 0.5)) < 0.015
-
-
 async def test_a_robot_with_neither_accelerometer_nor_traction_drives_without_the_loop() -> None:
     drives = {name: msgspec.structs.replace(drive, analog_inputs=False) for name, drive in TURTLE.drives.items()}
     plain = msgspec.structs.replace(TURTLE, accelerometer=None, traction=None, drives=drives)
