@@ -22,7 +22,7 @@ from daemon.runtime.omni_motions import GoalMotion, OmniMotion, TwistMotion, lon
 from daemon.runtime.poses import place_and_yaw
 from daemon.runtime.rest import AT_REST_M_S
 from daemon.runtime.streams import streamed
-from daemon.runtime.vehicle import Stick, Vehicle, both_ways, require_at_most
+from daemon.runtime.vehicle import Stick, Vehicle, both_ways, require_at_most, require_near
 from drivers.contract import Accelerometer as Sensor
 from drivers.contract import Drive, DriveState
 from profiles.schema import OmniGeometry, Profile
@@ -135,16 +135,20 @@ class OmniVehicle(Vehicle):
 
         Raises:
             UsageError: a number is none, or too large.
-            LimitExceeded: a limit is beyond the vehicle's, or the velocity at the goal beyond the limit.
+            LimitExceeded: a limit is beyond the vehicle's, the velocity at the goal beyond the limit, or the goal of
+                ``drive.to`` too far away.
         """
         self._check(goal, limits)
+        here = self.senses.pose
+        distance_m = math.hypot(goal.x - here.x_m, goal.y - here.y_m)
+        if kind == "drive.to":
+            require_near(distance_m, self.profile.limits)
         guide: Guide
         jerk, traction = self.profile.limits.jerk_m_s3, self._new_traction(limits.acceleration)
         longest_s = math.inf
         if published:
             guide = PublishedGuide(goal, limits, self._period_s, signals, threshold_m_s2)
-            here = self.senses.pose
-            longest_s = longest_drive_s(math.hypot(goal.x - here.x_m, goal.y - here.y_m), limits)
+            longest_s = longest_drive_s(distance_m, limits)
         elif jerk is not None:
             guide = JerkLimitedGuide(goal, limits, jerk, self._period_s, traction)
         else:
