@@ -175,4 +175,4 @@ class LawAlone:
 
 
 def _answer(guard: Guard, can_id: int, data: bytes, timestamp_s: float) -> None:
-    guard.answer(data[0] >> 7, timestamp_s)
+    guard.answer(data[0] >> 7)

@@ -17,6 +17,7 @@ import msgspec
 from profiles.bricks import NxtMotorConfig
 from profiles.checks import Finding, part
 from profiles.parts import Part
+from profiles.provenance import dotted
 from profiles.schema import (
     BodyGeometry,
     DriveConfig,
@@ -25,6 +26,7 @@ from profiles.schema import (
     Network,
     OmniGeometry,
     PairedSteerGeometry,
+    Profile,
     SimulationConfig,
 )
 from profiles.steered import CarGeometry, SemitrailerGeometry, SteeredAxle
@@ -89,6 +91,12 @@ def findings(data: dict[str, Any]) -> Iterator[Finding]:
     yield from _limits(limits, vehicle, encoders)
     telling = sum(drive is not None and drive.tells_inputs for drive in drives.values())
     yield from _bus(_valid(data.get("network", {}), Network), len(drives), len(encoders), telling)
+
+
+def objection(profile: Profile) -> str:
+    """The first thing that physics, the drives or the bus do not allow; empty where they allow everything."""
+    mistakes = (finding for finding in findings(msgspec.to_builtins(profile)) if not finding.warning)
+    return next((f"{dotted(mistake.path)} {mistake.what}" for mistake in mistakes), "")
 
 
 def _valid(value: Any, kind: type[T]) -> T | None:

@@ -276,6 +276,8 @@ class Limits(Part, frozen=True, kw_only=True):
     yaw_acceleration_deg_s2: Positive = 45.0
     lateral_acceleration_m_s2: Positive = 2.0
     """Of a vehicle that steers while it rolls; the faster it goes, the less it steers."""
+    goal_distance_m: Positive = 100.0
+    """Of ``drive to``, and of what an NXT robot drives under feedback: how far away a goal may be."""
     jerk_m_s3: Positive | None = None
     """Of ``drive to``: how fast its acceleration may change; None: at once."""
 

@@ -79,12 +79,14 @@ def _require_sound(profile: Path, side: Path, before: bytes | None) -> None:
     """Raise ConfigError where the profile has mistakes now, and put the side file back as it was."""
     try:
         load(profile)
-    except ConfigError:
+    except ConfigError as error:
         if before is None:
             side.unlink()
         else:
             _replace(side, before)
-        raise
+        remedy = f"give {profile} its own values of what is named, that go with the new ones; then write these again"
+        message = f"{side} stays as it was: with the new values {error.message}"
+        raise ConfigError(message, value=str(side), remedy=remedy) from None
 
 
 def _plain(calibration: AngleCalibration) -> dict[str, Any]:

@@ -143,7 +143,8 @@ def to(
     speed: float
         m/s, no faster than this.
     published: bool
-        By the planner and the traction controller that the Turtle robot's report prints, for comparison.
+        By the planner and the traction controller that the Turtle robot's report prints, for comparison: only to a
+        place, at rest, and given up after a time.
     """
     params: dict[str, Any] = {
         "x_m": x,

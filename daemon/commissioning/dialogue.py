@@ -34,17 +34,18 @@ async def agrees(person: Person, question: str) -> bool:
         person.tell("please answer y or n")
 
 
-async def number(person: Person, question: str, usual: float) -> float:
-    """A number greater than 0; the usual one where the answer is empty."""
+async def number(person: Person, question: str, usual: float, least: float = 0.0, most: float = 1e6) -> float:
+    """A number greater than 0, from least to most; the usual one where the answer is empty."""
     while True:
         answer = (await person.ask(f"{question} [{usual:g}]")).replace(",", ".")
         try:
             value = float(answer) if answer else usual
         except ValueError:
             value = 0.0
-        if 0.0 < value < 1e6:
+        if value > 0.0 and least <= value <= most:
             return value
-        person.tell(f"{answer!r} is no number greater than 0")
+        wanted = f"from {least:g} to {most:g}" if least else "greater than 0"
+        person.tell(f"{answer!r} is no number {wanted}")
 
 
 def told(error: CanhelmError) -> str:

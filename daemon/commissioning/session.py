@@ -13,8 +13,8 @@ from daemon.commissioning.dialogue import Daemon, Person, agrees, preview
 from daemon.commissioning.holding import holding_brakes, look_at_holding_brake
 from daemon.commissioning.pairs import Push, follow_swapped_wheels, judge_brakes, judge_encoders, push_pairs, turn_axes
 from daemon.commissioning.steered import judge_axle, look_at_axle, steered_axle
-from daemon.commissioning.wheels import Findings, Values, look_at_wheels, tried
-from profiles.schema import DriveConfig, PairedSteerGeometry, Profile
+from daemon.commissioning.wheels import Findings, Values, look_at_wheels, tried, wheels_of
+from profiles.schema import PairedSteerGeometry, Profile
 from profiles.steered import SteeredAxle
 
 ALL, PAIRS = "all", "pairs"
@@ -23,12 +23,6 @@ LIMITS = ("continuous_current_limit", "output_current_limit")
 
 class GivenUp(Refused):
     """The person has said no."""
-
-
-def wheels_of(profile: Profile) -> dict[str, DriveConfig]:
-    """The drives that turn wheels, by name; all of them where the robot has no vehicle."""
-    names = getattr(profile.vehicle, "wheels", None)
-    return {name: profile.drives[name] for name in (profile.drives if names is None else names)}
 
 
 def chosen_wheels(profile: Profile, what: str) -> list[str]:
@@ -79,7 +73,7 @@ async def commission(daemon: Daemon, person: Person, profile: Profile, what: str
         if not await _holding_brakes_work(daemon, person, profile, drives, findings):
             return findings
         async with capped(daemon, person, drives, current_ma):
-            await look_at_wheels(daemon, person, chosen, wheels_of(profile), _holding(profile), findings)
+            await look_at_wheels(daemon, person, chosen, profile, _holding(profile), findings)
             pushes = await _steer(daemon, person, profile, axle, findings) if axle else []
         if what in (ALL, PAIRS):
             pushes += await _push(daemon, person, profile, findings)

@@ -12,7 +12,8 @@ import msgspec
 
 from canhelm.errors import CanhelmError
 from daemon.commissioning.dialogue import Daemon, Person, agrees, number, told
-from profiles.schema import DriveConfig
+from profiles.feasibility import objection
+from profiles.schema import DriveConfig, Profile
 
 T = TypeVar("T")
 JOG_M_S = 0.1
@@ -21,6 +22,10 @@ LEAST_SHARE = 0.2
 """Share of the commanded way, and of a turn by hand, below which a wheel has not turned."""
 TOLERANCE = 0.015
 """Of the counts of one turn by hand: five degrees. An encoder of 512 pulses differs from one of 500 by 0.024."""
+DOUBTFUL = 0.1
+"""Share by which a gear has to differ from the profile's until a turn that was no whole one is the likelier cause."""
+PULSES = (16, 7500)
+"""What an EPOS takes as pulses of its encoder (object 0x2210/1)."""
 QUESTION = "which wheel turned, and which way? forward, backward or none; another wheel as `NAME forward`"
 Values = dict[tuple[str, ...], Any]
 
@@ -69,6 +74,12 @@ class Seen:
     radius_m: float = 0.0
 
 
+def wheels_of(profile: Profile) -> dict[str, DriveConfig]:
+    """The drives that turn wheels, by name; all of them where the robot has no vehicle."""
+    names = getattr(profile.vehicle, "wheels", None)
+    return {name: profile.drives[name] for name in (profile.drives if names is None else names)}
+
+
 def seen_wheel(answer: str, commanded: str, wheels: Mapping[str, DriveConfig]) -> tuple[str, bool] | None:
     """The wheel and whether it went forward, from a person's words; an empty name for none, None for no answer."""
     words = answer.lower().split()
@@ -103,9 +114,10 @@ async def jog(daemon: Daemon, drive: str, config: DriveConfig, speed_m_s: float,
 
 
 async def look_at_wheel(
-    daemon: Daemon, person: Person, drive: str, wheels: Mapping[str, DriveConfig], brakes: Sequence[str] = ()
+    daemon: Daemon, person: Person, drive: str, profile: Profile, brakes: Sequence[str] = ()
 ) -> Seen:
     """Jog one drive, ask what turned, and let the person turn it once by hand. Raises CanhelmError, EOFError."""
+    wheels = wheels_of(profile)
     config = wheels[drive]
     speed = min(JOG_M_S, config.max_speed_m_s)
     await person.ask(f"{drive} (node {config.node}) turns for {JOG_S:g} s as if forward; press Enter and watch")
@@ -117,15 +129,38 @@ async def look_at_wheel(
         return Seen(drive, wheel, forward, moved)
     for brake in brakes:
         await daemon.call("brake.release", pair=brake, force=True)
-    turn_qc = await _turned_by_hand(daemon, person, drive, wheel, _expected_qc(wheels[wheel]))
+    turn_qc, pulses = await _counts_of_a_turn(daemon, person, drive, wheel, wheels[wheel])
     for brake in brakes:
         await daemon.call("brake.engage", pair=brake)
-    fitted, pulses = wheels[wheel], wheels[wheel].encoder_pulses_per_turn
-    if turn_qc and not _fits(turn_qc, fitted, pulses):
-        person.tell(f"{abs(turn_qc)} counts a turn of {wheel}, and the profile says {_expected_qc(fitted):.0f}")
-        pulses = round(await number(person, "pulses a turn on the label of its encoder", pulses))
-    radius_m = await number(person, f"diameter of wheel {wheel} in mm", 2e3 * fitted.wheel_radius_m) / 2e3
+    radius_m = await _radius_m(person, wheel, profile)
     return Seen(drive, wheel, forward, moved, turn_qc, pulses, radius_m)
+
+
+async def _counts_of_a_turn(
+    daemon: Daemon, person: Person, drive: str, wheel: str, config: DriveConfig
+) -> tuple[int, int]:
+    """Counts of one turn by hand, 0 where there are hardly any, and the pulses of the encoder.
+
+    A gear that is far from the profile's is doubted: half a turn looks like half the gear.
+    """
+    while True:
+        turn_qc = await _turned_by_hand(daemon, person, drive, wheel, _expected_qc(config))
+        pulses = config.encoder_pulses_per_turn
+        if not turn_qc or _fits(turn_qc, config, pulses):
+            return turn_qc, pulses
+        person.tell(f"{abs(turn_qc)} counts a turn of {wheel}, and the profile says {_expected_qc(config):.0f}")
+        pulses = round(await number(person, "pulses a turn on the label of its encoder", pulses, *PULSES))
+        ratio = _ratio(turn_qc, pulses)
+        if abs(ratio / config.total_ratio - 1.0) <= DOUBTFUL:
+            return turn_qc, pulses
+        person.tell(f"that is {ratio:.4g} motor turns a turn of {wheel}, and the profile says {config.total_ratio:.4g}")
+        if await agrees(person, f"was it exactly one whole turn of {wheel}? Else it is turned again"):
+            return turn_qc, pulses
+
+
+def _ratio(turn_qc: int, pulses: int) -> float:
+    """Motor turns per wheel turn."""
+    return abs(turn_qc) / (4 * pulses)
 
 
 async def _turned_by_hand(daemon: Daemon, person: Person, drive: str, wheel: str, expected_qc: float) -> int:
@@ -139,6 +174,20 @@ async def _turned_by_hand(daemon: Daemon, person: Person, drive: str, wheel: str
         person.tell(f"{abs(turn_qc)} counts of about {expected_qc:.0f}: not turned, or not connected with its motor")
         if await agrees(person, f"has wheel {wheel} made a whole turn? A mark on its tyre tells"):
             return 0
+
+
+async def _radius_m(person: Person, wheel: str, profile: Profile) -> float:
+    """Radius of a wheel by its diameter; asked for again where the profile's limits are impossible with it."""
+    config = profile.drives[wheel]
+    while True:
+        diameter_mm = await number(person, f"diameter of wheel {wheel} in mm", 2e3 * config.wheel_radius_m)
+        fitted = msgspec.structs.replace(config, wheel_radius_m=diameter_mm / 2e3)
+        drives = {**profile.drives, wheel: fitted}
+        impossible = objection(msgspec.structs.replace(profile, drives=drives))
+        if not impossible:
+            return fitted.wheel_radius_m
+        person.tell(f"{diameter_mm:g} mm do not go with the profile: {impossible}")
+        person.tell("measure again; if that is its diameter, press Enter now and change both in the profile later")
 
 
 async def _position_qc(daemon: Daemon, drive: str) -> int:
@@ -199,7 +248,7 @@ def _judge_size(seen: Seen, config: DriveConfig, findings: Findings) -> None:
         findings.wrong.append(f"counts: {wheel} has an encoder of {seen.pulses} pulses, not {pulses}")
         findings.values["drives", wheel, "encoder_pulses_per_turn"] = seen.pulses
     if not _fits(seen.turn_qc, config, seen.pulses):
-        ratio = abs(seen.turn_qc) / (4 * seen.pulses)
+        ratio = _ratio(seen.turn_qc, seen.pulses)
         findings.wrong.append(f"gear: {wheel} has {ratio:.4g} motor turns a wheel turn, not {config.total_ratio:.4g}")
         findings.values["drives", wheel, "belt_ratio"] = round(ratio / config.gear_ratio, 4)
     if not math.isclose(seen.radius_m, config.wheel_radius_m, rel_tol=1e-4):
@@ -212,7 +261,7 @@ async def look_at_wheels(
     daemon: Daemon,
     person: Person,
     chosen: Sequence[str],
-    wheels: Mapping[str, DriveConfig],
+    profile: Profile,
     brakes: Mapping[str, Sequence[str]],
     findings: Findings,
 ) -> None:
@@ -220,13 +269,14 @@ async def look_at_wheels(
 
     Args:
         chosen: the drives.
-        wheels: all drives that turn wheels.
+        profile: the robot.
         brakes: names of the holding brakes, by their drives.
     """
     turned: dict[str, str] = {}
+    wheels = wheels_of(profile)
     for drive in chosen:
-        held = brakes.get(drive, ())
-        seen = await tried(daemon, person, drive, findings, partial(look_at_wheel, daemon, person, drive, wheels, held))
+        look = partial(look_at_wheel, daemon, person, drive, profile, brakes.get(drive, ()))
+        seen = await tried(daemon, person, drive, findings, look)
         if seen is None:
             continue
         if seen.wheel and turned.setdefault(seen.wheel, drive) != drive:

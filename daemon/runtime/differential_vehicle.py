@@ -20,7 +20,7 @@ from daemon.runtime.differential_stream import DifferentialStream, SetPoint
 from daemon.runtime.motions import Motion
 from daemon.runtime.poses import place_and_yaw
 from daemon.runtime.streams import streamed
-from daemon.runtime.vehicle import Stick, Vehicle, both_ways, require_at_most
+from daemon.runtime.vehicle import Stick, Vehicle, both_ways, require_at_most, require_near
 from drivers.contract import Drive
 from drivers.nxt.motors import NxtDrive
 from profiles.bricks import DifferentialGeometry, NxtMotorConfig
@@ -119,6 +119,7 @@ class DifferentialVehicle(Vehicle):
         limit = self.profile.limits.speed_m_s
         require_at_most("speed", speed or 0.0, limit, "m/s", "speed_m_s")
         reach, longest_m = params.get("tolerance_m") or TOLERANCE_M, _longest_m([self.odometry.pose, *goals])
+        require_near(longest_m, self.profile.limits)
         settings = SeekSettings(
             Tolerance(reach, reach, math.radians(params.get("tolerance_deg") or TOLERANCE_DEG)),
             timeout_s=params.get("timeout_s") or TIMEOUT_S + 2 * longest_m / (speed or limit),

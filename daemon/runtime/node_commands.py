@@ -182,10 +182,18 @@ class NodeCommands:
         for _ in range(ATTEMPTS):
             await asyncio.sleep(SETTLE_S)
             if await self._is_there(new):
-                return {"device": device, "node": new, "note": f"node {new} answers"}
+                return {"device": device, "node": new, "note": f"node {new} answers{self._unknown(new, old)}"}
         raise NodeAbsent(
             f"the device has stored node id {new}, but does not answer", node=new, remedy="switch it off and on"
         )
+
+    def _unknown(self, new: int, old: int | None) -> str:
+        """What is to be changed where the profile has no such node; empty where it has."""
+        devices = self._supervisor.devices.by_node
+        if new in devices:
+            return ""
+        whose = devices[old].name if old in devices else "a drive or an encoder"
+        return f"; the profile has no node {new}: write `node: {new}` there for {whose}, and start the daemon anew"
 
     async def _lss_set_bit_rate(self, params: Params, lease: str | None) -> dict[str, Any]:
         self._require_lss()

@@ -5,18 +5,33 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from canhelm.errors import DeviceFault
+from canhelm.errors import DeviceFault, Timeout
 from daemon.loops.measurement import Command, Measurement
 from daemon.loops.omni_drive import OmniLaw, OmniRecord
 from daemon.loops.omni_guide import Twist, TwistGuide
 from daemon.loops.omni_senses import OmniSenses
-from daemon.loops.planner import PlanarState, Result
+from daemon.loops.planner import PlanarLimits, PlanarState, Result
+from daemon.loops.published_traction import LEAST_FACTOR
 from daemon.runtime.motions import Motion
 from daemon.runtime.poses import place_and_heading
 from daemon.runtime.streams import Streamed
 
 FAILED = (Result.INVALID, Result.GOAL_TOO_FAST)
 STANDING: Twist = (0.0, 0.0, 0.0)
+PATIENCE = 2.0
+"""Times the longest drive that a planner without an end of its own may take."""
+
+
+def longest_drive_s(distance_m: float, limits: PlanarLimits) -> float:
+    """Time that the published planner gets, which may never arrive [s].
+
+    From rest to rest takes s / v + v / a; here a is as low as its traction control makes it, and the time counts twice.
+
+    Args:
+        distance_m: s, to the goal.
+        limits: of the motion, v and a.
+    """
+    return PATIENCE * (distance_m / limits.speed + limits.speed / (LEAST_FACTOR * limits.acceleration))
 
 
 class OmniMotion(Motion):
@@ -105,14 +120,31 @@ class GoalMotion(OmniMotion):
 
     Args:
         goal: in the odometry's frame.
+        longest_s: time after which it is given up.
     """
 
     def __init__(
-        self, kind: str, drives: tuple[str, ...], lease: str | None, senses: OmniSenses, law: OmniLaw, goal: PlanarState
+        self,
+        kind: str,
+        drives: tuple[str, ...],
+        lease: str | None,
+        senses: OmniSenses,
+        law: OmniLaw,
+        goal: PlanarState,
+        longest_s: float = math.inf,
     ) -> None:
         super().__init__(kind, drives, lease, senses, law)
         self._goal = goal
+        self._longest_s = longest_s
         self._reached: dict[str, Any] | None = None
+
+    def step(self, measurement: Measurement, dt_s: float) -> Command:
+        """One step of the law, unless the time is over."""
+        if self._reached is None and measurement.time_s - self.begun_s > self._longest_s:
+            message = f"{self.kind}: the published planner did not arrive in {self._longest_s:.1f} s"
+            remedy = "drive without --published; docs/turtle.md tells what is peculiar about it"
+            self.fail(Timeout(message, value=self.numbers(measurement), remedy=remedy))
+        return super().step(measurement, dt_s)
 
     def on_done(self, measurement: Measurement, record: OmniRecord) -> None:
         """At the goal, or at rest behind it."""

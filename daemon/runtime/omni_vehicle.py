@@ -19,11 +19,11 @@ from daemon.loops.slip import THRESHOLD_M_S2
 from daemon.loops.traction import Traction, TractionTuning
 from daemon.loops.turning_centre import Point, centre_of_twist
 from daemon.runtime.motions import Motion
-from daemon.runtime.omni_motions import GoalMotion, OmniMotion, TwistMotion
+from daemon.runtime.omni_motions import GoalMotion, OmniMotion, TwistMotion, longest_drive_s
 from daemon.runtime.poses import place_and_yaw
 from daemon.runtime.rest import AT_REST_M_S
 from daemon.runtime.streams import streamed
-from daemon.runtime.vehicle import Stick, Vehicle, both_ways, require_at_most
+from daemon.runtime.vehicle import Stick, Vehicle, both_ways, require_at_most, require_near
 from drivers.contract import Accelerometer as Sensor
 from drivers.contract import Drive, DriveState
 from profiles.schema import OmniGeometry, Profile
@@ -136,18 +136,25 @@ class OmniVehicle(Vehicle):
 
         Raises:
             UsageError: a number is none, or too large.
-            LimitExceeded: a limit is beyond the vehicle's, or the velocity at the goal beyond the limit.
+            LimitExceeded: a limit is beyond the vehicle's, the velocity at the goal beyond the limit, or the goal of
+                ``drive.to`` too far away.
         """
         self._check(goal, limits)
+        here = self.senses.pose
+        distance_m = math.hypot(goal.x - here.x_m, goal.y - here.y_m)
+        if kind == "drive.to":
+            require_near(distance_m, self.profile.limits)
         guide: Guide
         jerk, traction = self.profile.limits.jerk_m_s3, self._new_traction(limits.acceleration)
+        longest_s = math.inf
         if published:
             guide = PublishedGuide(goal, limits, self._period_s, signals, threshold_m_s2)
+            longest_s = longest_drive_s(distance_m, limits)
         elif jerk is not None:
             guide = JerkLimitedGuide(goal, limits, jerk, self._period_s, traction)
         else:
             guide = GoalGuide(goal, limits, traction)
-        return GoalMotion(kind, self._names, lease, self.senses, self._law(guide), goal)
+        return GoalMotion(kind, self._names, lease, self.senses, self._law(guide), goal, longest_s)
 
     def _to(self, params: dict[str, Any], lease: str | None) -> Motion:
         heading, speed = params.get("heading_deg"), params.get("speed_m_s")
@@ -156,7 +163,12 @@ class OmniVehicle(Vehicle):
             params["x_m"], params["y_m"], yaw, params.get("end_vx_m_s", 0.0), params.get("end_vy_m_s", 0.0)
         )
         limits = self.limits if speed is None else replace(self.limits, speed=float(speed))
-        return self.to_goal(goal, limits, lease, published=params.get("planner") == "published")
+        published = params.get("planner") == "published"
+        if published and (heading is not None or goal.vx or goal.vy):
+            what = "turns no robot" if heading is not None else "drives to a goal with a velocity again and again"
+            remedy = "leave the planner (--published) out, or give a place alone"
+            raise UsageError(f"the published planner {what}", object="planner", remedy=remedy)
+        return self.to_goal(goal, limits, lease, published=published)
 
     def _parallel(self, params: dict[str, Any], lease: str | None) -> Motion:
         """The way that speed and duration make, as a goal."""

@@ -108,8 +108,11 @@ class Supervisor:
 
     @property
     def message(self) -> str:
-        """One sentence about the state: what is wrong, or what is waited for."""
-        return self._stopping.message or self._bus_trouble or "; ".join(self._waiting()) or self._rolling.sentence
+        """One sentence about the state: what is wrong now, what is latched, or what is waited for."""
+        trouble, latched = self.master.bus.trouble, self._stopping.message
+        if latched and trouble is not None and not latched.startswith(trouble.message):
+            return f"{trouble}; {latched}"
+        return latched or self._bus_trouble or "; ".join(self._waiting()) or self._rolling.sentence
 
     @property
     def _bus_trouble(self) -> str:

@@ -15,7 +15,7 @@ from daemon.loops.turning_centre import Point
 from daemon.runtime.motions import Motion
 from daemon.runtime.streams import valid_for_s
 from drivers.contract import Brake, BrakeState, Drive, SteeringEncoder
-from profiles.schema import Profile
+from profiles.schema import Limits, Profile
 
 BRICK_DELAY_S: Final = 0.5
 """What a stop takes to reach a brick's motor, and its rest to come back, a few turnarounds of Bluetooth; assumed."""
@@ -53,6 +53,11 @@ def require_at_most(what: str, value: float, limit: float, unit: str, name: str)
             limit=f"{name} {allowed:g}",
             remedy=f"ask for at most {allowed:g} {unit}",
         )
+
+
+def require_near(distance_m: float, limits: Limits) -> None:
+    """Raise LimitExceeded where a goal is farther away than a profile's limits allow."""
+    require_at_most("distance to the goal", distance_m, limits.goal_distance_m, "m", "goal_distance_m")
 
 
 class Vehicle(ABC):

@@ -20,6 +20,10 @@ LATE_CYCLES = 2
 """Cycles between two looks from which on the daemon itself counts as late."""
 
 
+OLD_S = 10.0
+"""An older reading tells nothing of how soon the stop came: its node was away since, or this program stood still."""
+
+
 class _Unread:
     """Looks at a device since its last reading."""
 
@@ -92,8 +96,10 @@ class DeviceWatch:
 
     def _silence(self, device: Device, what: str, remedy: str, now_s: float) -> DeviceFault:
         """The fault; it tells where the daemon was late itself since the last reading, as then nobody listened."""
-        what = f"{what}; stop commanded {(now_s - device.reading_time_s) * 1e3:.0f} ms after its last reading"
-        if self._stall_end_s >= device.reading_time_s:
+        age_s = now_s - device.reading_time_s
+        if age_s < OLD_S:
+            what = f"{what}; stop commanded {age_s * 1e3:.0f} ms after its last reading"
+        if self._stall_end_s >= device.reading_time_s > -math.inf:
             what = f"{what}; the daemon itself was {self._stall_s * 1e3:.0f} ms late meanwhile"
             remedy = f"look for what loads this machine: `canhelm doctor`; else {remedy}"
         return DeviceFault(what, node=device.node, remedy=remedy)

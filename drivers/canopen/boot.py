@@ -116,10 +116,15 @@ class NodeBoot:
                 self._sign_of_life.clear()
             elif not self._sign_of_life.is_set():
                 self._device.node_state = NodeState.ABSENT
-                lacks = "no SDO answer since its boot-up; is it still powered?" if self._booted else NO_BOOT_UP
-                self._say("waiting", f"waiting for {self._who}: {lacks}")
+                self._say("waiting", f"waiting for {self._who}: {self._lacks()}")
             await self._pause(pause_s)
             pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
+
+    def _lacks(self) -> str:
+        """Why the node is not there: the interface where that does not work, else what is not heard of the node."""
+        if self._master.bus.trouble is not None:
+            return self._master.bus.trouble.message
+        return "no SDO answer since its boot-up; is it still powered?" if self._booted else NO_BOOT_UP
 
     async def _answers(self) -> bool:
         """Take the node to pre-operational, alone, and see whether it answers (a stopped node would not)."""
@@ -235,7 +240,7 @@ class NodeBoot:
         self._device.sdo.give_up("restarted")
 
     def _on_guarding_answer(self, toggle: int, state: int) -> None:
-        alternates = self._guard.answer(toggle, asyncio.get_running_loop().time())
+        alternates = self._guard.answer(toggle)
         if not alternates:
             self._master.counters.toggle_errors += 1
             if not self._wrong_toggle:
@@ -250,9 +255,14 @@ class NodeBoot:
             words = STATE_WORDS.get(state, f"in state {state}")
             self._leave("lost", f"{self._who} is no longer operational but {words}", "it is configured again by itself")
 
-    def _on_lost(self, silent_s: float) -> None:
-        message = f"{self._who} is lost: no guarding answer for {silent_s * 1e3:.0f} ms"
-        self._leave("lost", message, "check its motor power and the CAN cable; it is configured again when it is back")
+    def _on_lost(self, awaited_s: float) -> None:
+        why = f"no guarding answer for {awaited_s * 1e3:.0f} ms" if awaited_s else "the gateway waited for it in vain"
+        message = f"{self._who} is lost: {why}"
+        remedy = "check its motor power and the CAN cable; it is configured again when it is back"
+        trouble = self._master.bus.trouble
+        if trouble is not None:  # then the node is not to blame
+            message, remedy = f"{trouble.message}; {message}", trouble.remedy or ""
+        self._leave("lost", message, remedy)
 
     def _leave(self, kind: str, message: str, remedy: str, severity: str = "error") -> None:
         """The node was ready and is no longer. One that is held by command is guarded on, for it guards its life."""

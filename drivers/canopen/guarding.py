@@ -32,7 +32,8 @@ class Guard:
         node: node id.
         guard_time_s: time between two requests.
         request: sends a remote frame with the COB-ID it is given.
-        on_lost: called once with the time since the last sign of life.
+        on_lost: called once with how long its answer was awaited, pauses of this program left out; 0 where the node was
+            not asked, and is known to be silent otherwise.
         pacing: told from when on and how long an answer is awaited.
         patience_s: the node is not given up sooner than this after a request.
     """
@@ -56,12 +57,11 @@ class Guard:
         self._next_s = math.inf
         self._asked_s: float | None = None
         self._repeated = False
-        self._alive_s = 0.0
         self._toggle: int | None = None
 
     def arm(self, now_s: float) -> None:
         """Guard from now on; the first request goes out with the next call of :meth:`due`."""
-        self._next_s = self._alive_s = now_s
+        self._next_s = now_s
         self._await_no_more()
         self._toggle = None
 
@@ -81,14 +81,17 @@ class Guard:
             if now_s >= self._next_s:
                 self._ask(now_s)
             return
-        pause_s, self._called_s = now_s - self._called_s, now_s
-        if pause_s > PAUSE * self.guard_time_s:  # of this program: an answer may wait unread, its time begins anew
-            self._asked_s += pause_s
-        if now_s >= self._asked_s + self._lost_s:
+        asked_s = self._asked_s = self._asked_s + self._pause_s(now_s)
+        if now_s >= asked_s + self._lost_s:
             self.lose(now_s)
-        elif not self._repeated and now_s >= self._asked_s + REPEAT_AFTER * self.guard_time_s:
+        elif not self._repeated and now_s >= asked_s + REPEAT_AFTER * self.guard_time_s:
             self._repeated = True
             self._request(RTR_FLAG | ERROR_CONTROL_COB_ID + self.node)
+
+    def _pause_s(self, now_s: float) -> float:
+        """How long this program itself stood still since the last call: an answer may wait unread meanwhile."""
+        pause_s, self._called_s = now_s - self._called_s, now_s
+        return pause_s if pause_s > PAUSE * self.guard_time_s else 0.0
 
     def _ask(self, now_s: float) -> None:
         self._asked_s = self._called_s = now_s
@@ -100,14 +103,15 @@ class Guard:
     def lose(self, now_s: float) -> None:
         """The node is known to be silent; its guard reports it lost."""
         if self.armed:
+            asked_s = self._asked_s
+            awaited_s = 0.0 if asked_s is None else now_s - asked_s - self._pause_s(now_s)
             self.disarm()
-            self._on_lost(now_s - self._alive_s)
+            self._on_lost(awaited_s)
 
-    def answer(self, toggle: int, now_s: float) -> bool:
+    def answer(self, toggle: int) -> bool:
         """Take an answer; False where its toggle bit did not alternate. The first answer may have either."""
         alternates = toggle != self._toggle
         self._toggle = toggle
-        self._alive_s = now_s
         self._await_no_more()
         return alternates
 

@@ -102,13 +102,7 @@ class Master:
         return f"node {node} ({name})" if name else f"node {node}"
 
     def tell(self, node: int, kind: str, severity: str, message: str, remedy: str = "") -> None:
-        """Pass an event about a node on; arguments as in :class:`NodeEvent`.
-
-        A node that is lost while the interface does not work is not to blame.
-        """
-        trouble = self.bus.trouble
-        if kind == "lost" and trouble is not None:
-            message, remedy = f"{message}; {trouble.message}", trouble.remedy or ""
+        """Pass an event about a node on; arguments as in :class:`NodeEvent`."""
         if self.on_event is not None:
             now = asyncio.get_running_loop().time()
             self.on_event(NodeEvent(now, node, self.names.get(node, ""), kind, severity, message, remedy))
@@ -156,7 +150,7 @@ class Master:
     # --- guarding ------------------------------------------------------------------------------------------------
 
     def guard(self, node: int, on_lost: Callable[[float], None]) -> Guard:
-        """The guard of a node, not armed yet; ``on_lost`` gets the time since its last sign of life."""
+        """The guard of a node, not armed yet; ``on_lost`` as in :class:`Guard`."""
         guard_time_s, patience_s = self.network.guard_time_ms / 1e3, self.network.patience_s
         guard = Guard(node, guard_time_s, self._send_guard_request, on_lost, self.pacing, patience_s)
         self._guards[node] = guard

@@ -71,6 +71,40 @@ brakes:
     assert (found.drives, found.encoders, found.brakes) == (true.drives, true.encoders, true.brakes)
 
 
+async def test_half_a_turn_by_hand_is_doubted_with_both_gears_and_turned_again(tmp_path: Path) -> None:
+    async with workshop(robot_file(tmp_path)) as shop:
+        shop.person.mistaken = {"turn wheel": "180", "was it exactly one whole turn": "n"}
+        findings = await shop.commission("rear_left")
+        assert (findings.wrong, findings.values) == ([], {})
+        assert "that is 14 motor turns a turn of rear_left, and the profile says 28" in shop.person.heard
+
+
+async def test_a_gear_within_a_tenth_of_the_profiles_is_not_doubted(tmp_path: Path) -> None:
+    built = robot_file(tmp_path / "built", "drives: {rear_left: {belt_ratio: 2.1}}")
+    async with workshop(robot_file(tmp_path / "mine"), built) as shop:
+        findings = await shop.commission("rear_left")
+        assert list(findings.values) == [("drives", "rear_left", "belt_ratio")]
+        assert not any(heard.startswith("was it exactly") for heard in shop.person.heard)
+
+
+@pytest.mark.parametrize(
+    ("question", "wrong", "told"),
+    [
+        ("diameter", "2000", "2000 mm do not go with the profile: drives.rear_left."),
+        ("pulses", "0.3", "'0.3' is no number from 16 to 7500"),
+    ],
+)
+async def test_what_the_profile_cannot_take_is_told_at_the_question_and_asked_for_again(
+    question: str, wrong: str, told: str, tmp_path: Path
+) -> None:
+    built = robot_file(tmp_path / "built", "drives: {rear_left: {encoder_pulses_per_turn: 512}}")
+    async with workshop(robot_file(tmp_path / "mine"), built) as shop:
+        shop.person.labels, shop.person.mistaken = {"rear_left": 512}, {question: wrong}
+        findings = await shop.commission("rear_left")
+        assert findings.values == {("drives", "rear_left", "encoder_pulses_per_turn"): 512}
+        assert any(heard.startswith(told) for heard in shop.person.heard)
+
+
 async def test_a_robot_that_is_built_as_its_profile_says_changes_nothing(tmp_path: Path) -> None:
     async with workshop(robot_file(tmp_path)) as shop:
         findings = await shop.commission()

@@ -231,6 +231,19 @@ async def test_an_encoder_with_an_id_gets_another_one_that_it_keeps() -> None:
         assert (40 in nodes, 41 in nodes) == (False, True)
 
 
+async def test_an_id_that_the_profile_does_not_have_is_told_with_what_to_change() -> None:
+    async with running_robot(expect_errors=True) as robot:
+        new_encoder(robot, 40).power_on()
+        await asyncio.sleep(0.1)
+        for device, whose in (("40", "a drive or an encoder"), ("front", "front")):
+            told = await robot.call("lss.set_node_id", device=device, node_id=50 + len(whose), confirm=True)
+            node = told["node"]
+            assert told["note"] == (
+                f"node {node} answers; the profile has no node {node}: write `node: {node}` there for {whose}, "
+                "and start the daemon anew"
+            )
+
+
 async def test_a_node_id_that_is_taken_is_not_given() -> None:
     async with running_robot() as robot:
         with pytest.raises(Refused, match="node id 3 is taken"):

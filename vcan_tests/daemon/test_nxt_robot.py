@@ -123,6 +123,8 @@ async def test_one_motor_turns_at_a_velocity() -> None:
     [
         ("nxt.line", {"distance_m": 0.5, "power": 90}, LimitExceeded),
         ("drive.to", {"x_m": 1.0, "y_m": 0.0, "speed_m_s": 2.0}, LimitExceeded),
+        ("drive.to", {"x_m": 99999.0, "y_m": 0.0}, LimitExceeded),
+        ("nxt.goto", {"x_m": 0.0, "y_m": -101.0}, LimitExceeded),
         ("drive.to", {"x_m": 1.0, "y_m": 0.0, "end_vx_m_s": 0.1}, UsageError),
         ("drive.to", {"x_m": 1.0, "y_m": 0.0, "planner": "published"}, UsageError),
         ("nxt.moves", {"moves": ["hop 3"]}, UsageError),

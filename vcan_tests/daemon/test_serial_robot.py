@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from canhelm.errors import CanhelmError, Interlock
+from canhelm.errors import CanhelmError, DeviceFault, Interlock
+from drivers.epos.serial_bus import SerialGatewayBus
 from drivers.epos.serial_plan import (
     plan,
     serial_limits,
@@ -88,6 +89,29 @@ async def test_a_pulled_cable_stops_every_wheel_within_the_stated_way() -> None:
         assert robot.network.world.pose[0] - x < stopping_way_m(robot.app.profile, 0.3)
         with pytest.raises(CanhelmError):
             await driving
+
+
+async def test_a_line_that_is_dead_is_told_before_the_fault_that_is_latched() -> None:
+    async with running_robot(bus="rs232", expect_errors=True) as robot:
+        robot.app.supervisor.fault(DeviceFault("node 2 (rear_left) was too hot"))
+        assert robot.app.wire.cable is not None
+        robot.app.wire.cable.pulled = True
+        await robot.until(lambda: robot.app.bus.trouble is not None, 10.0)
+        message = robot.app.service.status()["message"]
+        assert message.startswith("the drive on rs232 does not answer (is it switched on")
+        assert message.endswith("; node 2 (rear_left) was too hot; after the cause is gone: `canhelm reset`")
+
+
+async def test_where_the_line_is_hung_up_nobody_asks_for_motor_power() -> None:
+    async with running_robot(bus="rs232", expect_errors=True) as robot:
+        bus, nodes = robot.app.bus, robot.app.devices.by_node.values()
+        assert isinstance(bus, SerialGatewayBus)
+        assert bus.line is not None
+        bus.line.lose("the line was hung up")
+        await robot.until(lambda: all(device.status_sentence.startswith("waiting for") for device in nodes))
+        assert {device.status_sentence.split(": ", 1)[1] for device in nodes} == {"rs232 is gone: the line was hung up"}
+        events = robot.app.supervisor.log.last(100)
+        assert not any("motor power" in f"{event['message']} {event['remedy']}" for event in events)
 
 
 async def test_with_its_cable_pulled_the_daemon_ends_before_the_service_would_be_killed() -> None:

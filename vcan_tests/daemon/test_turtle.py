@@ -167,6 +167,7 @@ async def test_which_number_of_a_goal_cannot_be_is_told(given: dict[str, float],
         ("drive.to", {"x_m": 1.0, "y_m": 0.0, "speed_m_s": 9.0}, LimitExceeded),
         ("drive.to", {"x_m": 1.0, "y_m": 0.0, "speed_m_s": -1.0}, UsageError),
         ("drive.to", {"x_m": 1.0, "y_m": 0.0, "end_vx_m_s": 1.0, "end_vy_m_s": 1.0}, LimitExceeded),
+        ("drive.to", {"x_m": 99999.0, "y_m": 0.0}, LimitExceeded),
         ("drive.parallel", {"angle_deg": 0.0, "speed_m_s": 9.0, "duration_s": 1.0}, LimitExceeded),
         ("drive.rotate", {"rate_deg_s": 400.0, "duration_s": 1.0}, LimitExceeded),
         ("drive.set", {"direction_deg": 0.0, "speed_m_s": 3.0, "valid_for_ms": 300}, LimitExceeded),
@@ -284,11 +285,12 @@ async def test_without_ice_nothing_slips_and_the_safety_factor_stays() -> None:
             assert (result["slip_steps"], result["least_safety_factor"]) == (0, 1.0)
 
 
-async def test_the_published_planner_drives_there_too() -> None:
-    async with running_robot(TURTLE) as robot:
-        result = await robot.call("drive.to", x_m=1.0, y_m=0.5, planner="published")
-        assert result["result"] == "arrived"
-        assert math.dist(pose_of(robot)[:2], (1.0, 0.5)) < 0.015
+@pytest.mark.parametrize(("farthest_m", "refused"), [(0.5, True), (0.51, False)])
+async def test_how_far_away_a_goal_may_be_its_profile_says(farthest_m: float, refused: bool) -> None:
+    limits = msgspec.structs.replace(TURTLE.limits, goal_distance_m=farthest_m)
+    async with running_robot(msgspec.structs.replace(TURTLE, limits=limits)) as robot:
+        told = await robot.begin("drive.to", x_m=0.4, y_m=-0.31)
+        assert ("goal_distance_m 0.5" in str(getattr(told, "limit", ""))) is refused
 
 
 async def test_a_robot_with_neither_accelerometer_nor_traction_drives_without_the_loop() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from daemon.app import App
@@ -86,6 +88,13 @@ def test_a_daemon_that_was_late_itself_says_so(devices: Devices) -> None:
 def test_a_lateness_before_the_last_reading_is_no_excuse(devices: Devices) -> None:
     told = watching(devices, 0.9, 0.98, 0.99, *(1.0 + PERIOD_S * number for number in range(7)))
     assert "late" not in told
+
+
+@pytest.mark.parametrize("read_s", [-math.inf, 2.0])
+def test_a_reading_of_another_life_says_nothing_of_how_soon_the_stop_came(devices: Devices, read_s: float) -> None:
+    devices.by_node[1].reading_time_s = read_s
+    event = NodeEvent(100.0, 1, "rear_right", "lost", "error", "node 1 is lost", "check the cable")
+    assert str(DeviceWatch(devices, PERIOD_S, interface()).lost(event)) == "node 1 is lost (check the cable)"
 
 
 def test_a_lost_node_is_not_blamed_for_the_daemons_lateness_either(devices: Devices) -> None:

@@ -26,6 +26,12 @@ def test_a_promise_is_held_by_a_test_that_exists(room: str, test: str) -> None:
     assert test in named_in(room)
 
 
+@pytest.mark.parametrize("room", sorted({room for room, _ in HELD_BY}))
+def test_a_test_is_where_the_commands_of_the_page_look_for_it(room: str) -> None:
+    folder = "systemd" if room.startswith(("test_service_", "test_upgrade_")) else "daemon"
+    assert list((ROOT / "vcan_tests" / folder).rglob(room))
+
+
 def test_every_promise_names_what_holds_it() -> None:
     rows = [line for line in PAGE.splitlines() if line.startswith("| ") and not line.startswith(("| ---", "| promise"))]
     assert rows

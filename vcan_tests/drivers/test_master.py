@@ -273,7 +273,10 @@ async def test_a_node_that_is_lost_with_the_interface_is_not_to_blame() -> None:
     async with bench() as b:
         b.events.clear()
         b.port.down = "Network is down"
-        b.master.tell(3, "lost", "error", "node 3 (front_left) is lost", "check its motor power")
-        (event,) = b.events
-    assert event.message == "node 3 (front_left) is lost; vcan0 does not work: Network is down"
-    assert "motor power" not in event.remedy
+        b.network.power_off(3)
+        await asyncio.sleep(0.3)
+        fault, lost = b.drive().fault, next(event for event in b.events if event.kind == "lost")
+    assert lost.message.startswith("vcan0 does not work: Network is down; node 3 (front_left) is lost: no guarding")
+    assert fault is not None
+    assert (fault.message, fault.remedy) == (lost.message, lost.remedy)
+    assert "motor power" not in lost.remedy

@@ -35,6 +35,13 @@ def test_one_that_is_damaged_is_told_and_left_alone(robot: Path, content: bytes)
     assert side.read_bytes() == content
 
 
+def test_values_that_make_the_profile_impossible_are_not_kept_and_the_persons_file_is_named(robot: Path) -> None:
+    with pytest.raises(ConfigError, match="stays as it was: with the new values") as refused:
+        write_values(robot, {("drives", "rear_left", "wheel_radius_m"): 1.0})
+    assert f"give {robot} its own values" in str(refused.value.remedy)
+    assert not robot.with_name("lab.calibration.yaml").exists()
+
+
 @pytest.mark.parametrize("text", ["a: !!int", "a: !!float ' '", "a: !!bool perhaps", "a: !!timestamp soon", "[" * 5000])
 def test_what_is_no_yaml_is_refused_as_that(text: str) -> None:
     with pytest.raises(ValueError, match=r"."):
