@@ -188,7 +188,9 @@ def test_scripts_are_sound_shell_and_can_be_run(script: Path) -> None:
 
 
 @pytest.mark.systemd
-@pytest.mark.parametrize("unit", ["canhelm@max2d.service", "canhelm@max2d.socket", "canhelm-station.service", "can@can0.service"])
+@pytest.mark.parametrize(
+    "unit", ["canhelm@max2d.service", "canhelm@max2d.socket", "canhelm-station.service", "can@can0.service"]
+)
 def test_systemd_finds_nothing_to_complain_about(unit: str, tmp_path: Path) -> None:
     _with_stand_in(tmp_path)
     assert _verify(unit, tmp_path) == (0, "")
