@@ -94,8 +94,7 @@ class Link:
         ending = next((way.result() for way in (asking, hearing) if way in done and way.result()), None)
         if ending is not None:
             await hang_up(self._page, *ending)
-        if self._outbox.lost:
-            LOGGER.info("a page of %s has read too slowly for %d notifications", self._robot.name, self._outbox.lost)
+        LOGGER.info("a page of %s has gone; %d notifications came too fast for it", self._robot.name, self._outbox.lost)
 
     def _give_up(self, reason: str) -> None:
         """Hang up on a page that would not read a farewell."""
