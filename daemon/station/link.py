@@ -122,6 +122,7 @@ class Link:
                 await daemon.drain()
             except ConnectionError:
                 return self._gone()
+            await asyncio.sleep(0)  # other pages get their turn, too
         return None
 
     def _taken(self, message: WSMessage) -> bytes:
