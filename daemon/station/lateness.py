@@ -8,7 +8,7 @@ from typing import Any, Final
 from canhelm.errors import Refused
 from daemon.api.methods import METHODS
 
-LATE_S: Final = 0.5
+LATE_S: Final = 1.0
 """On the way longer than the quickest message by this much, a command is too old to move anything."""
 _REMEMBERED_S: Final = 30.0
 """How long the quickest message counts, at least; clocks that drift by 0.01 % differ by 3 ms then."""
