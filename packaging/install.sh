@@ -18,7 +18,7 @@ put() { # FILE TARGET: a file, with the program's place in it
 install_program() { # an environment of its own, without pip, as if it had been made in $prefix
 	mkdir -p "$root$prefix"
 	"$PYTHON" -m venv --clear --without-pip "$root$prefix"
-	"$PIP_PYTHON" -m pip --python "$root$prefix/bin/python3" install --quiet --disable-pip-version-check --no-compile '.[slcan]'
+	"$PIP_PYTHON" -m pip --python "$root$prefix/bin/python3" install --quiet --disable-pip-version-check --no-compile '.[slcan,web]'
 	find "$root$prefix/lib" -name direct_url.json -delete
 	find "$root$prefix/lib" -depth -path '*/site-packages/*/tests' -exec rm -rf {} + # those of libraries
 	grep -lIr "$root$prefix" "$root$prefix/bin" "$root$prefix/pyvenv.cfg" | xargs -r sed -i "s|$root$prefix|$prefix|g"
@@ -40,7 +40,7 @@ install_help() { # made by the installed program from its own tables
 }
 
 install_files() {
-	for unit in canhelm@.service canhelm@.socket can@.service; do put "systemd/$unit" "$lib/systemd/system/$unit"; done
+	for unit in canhelm@.service canhelm@.socket canhelm-station.service can@.service; do put "systemd/$unit" "$lib/systemd/system/$unit"; done
 	put systemd/canhelm.sysusers "$lib/sysusers.d/canhelm.conf"
 	put systemd/canhelm.tmpfiles "$lib/tmpfiles.d/canhelm.conf"
 	put systemd/canhelm.sysctl "$lib/sysctl.d/60-canhelm.conf"

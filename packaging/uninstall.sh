@@ -5,7 +5,7 @@ prefix=${PREFIX:-/opt/canhelm}
 root=${DESTDIR:-}
 lib=$root/usr/lib
 if [ -z "$root" ] && [ -d /run/systemd/system ]; then
-	systemctl stop 'canhelm@*.service' 'canhelm@*.socket'
+	systemctl stop 'canhelm*.service' 'canhelm@*.socket'
 fi
 rm -rf "$root$prefix" "$root/usr/share/doc/canhelm"
 rm -f "$root/usr/share/man/man1/canhelm.1.gz" "$root"/usr/share/man/man1/canhelm-*.1.gz \
@@ -13,6 +13,7 @@ rm -f "$root/usr/share/man/man1/canhelm.1.gz" "$root"/usr/share/man/man1/canhelm
 	"$root/usr/share/fish/vendor_completions.d/canhelm.fish"
 rm -f "$root/usr/bin/canhelm" "$root/etc/needrestart/conf.d/canhelm.conf" \
 	"$lib/systemd/system/canhelm@.service" "$lib/systemd/system/canhelm@.socket" "$lib/systemd/system/can@.service" \
+	"$lib/systemd/system/canhelm-station.service" \
 	"$lib/sysusers.d/canhelm.conf" "$lib/tmpfiles.d/canhelm.conf" "$lib/sysctl.d/60-canhelm.conf" \
 	"$lib/udev/rules.d/60-canhelm.rules"
 if [ -z "$root" ] && [ -d /run/systemd/system ]; then

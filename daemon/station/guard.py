@@ -8,9 +8,9 @@ keeps out the others (Fetch Metadata Request Headers, W3C).
 from __future__ import annotations
 
 import ipaddress
+import re
 import socket
 from typing import Final
-from urllib.parse import urlsplit
 
 from aiohttp import web
 
@@ -26,6 +26,8 @@ HEADERS: Final = {
 }
 EVERYWHERE: Final = ("0.0.0.0", "::")
 """Addresses of a server that listens on all addresses of its machine."""
+_HOST: Final = re.compile(r"(?:\[([0-9a-f:.]+)\]|([a-z0-9._-]+))(?::[0-9]{1,5})?", re.ASCII)
+"""An address of IPv6, or a name or another address; perhaps with a port (RFC 9110, 7.2)."""
 _ELSEWHERE: Final = ("192.0.2.1", 9)
 """An address that nobody has (RFC 5737)."""
 _OWN_PAGES: Final = ("same-origin", "none")
@@ -59,10 +61,8 @@ class Guard:
 
     def is_here(self, host: str) -> bool:
         """Whether a ``Host`` is this machine. No page of a stranger has a bare address for its name."""
-        try:
-            name = (urlsplit(f"//{host}").hostname or "").rstrip(".")
-        except ValueError:
-            return False
+        found = _HOST.fullmatch(host.lower())
+        name = (found[1] or found[2]).rstrip(".") if found else ""
         if name in self._names:
             return True
         return is_loopback(name) if self.on_loopback else _is_address(name)

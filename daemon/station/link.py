@@ -16,6 +16,7 @@ from aiohttp import WSMessage, WSMsgType, web
 from canhelm import protocol
 from canhelm.errors import CanhelmError, Refused, UsageError
 from daemon.api.parameters import Method, Role, validate
+from daemon.station.lateness import Lateness
 from daemon.station.limits import lowered, refusal
 from daemon.station.methods import METHODS, PREFIX, Function
 from daemon.station.outbox import Outbox
@@ -39,6 +40,8 @@ UNSENT_BYTES: Final = 16 * 1024
 """What the kernel holds for a page beyond what is on its way: samples that wait there would only get older."""
 _REASON_BYTES: Final = 123
 """Of the reason with which a WebSocket closes (RFC 6455, 5.5)."""
+SENT: Final = "sent_ms"
+"""Member of a request: when it was sent, by the page's clock; the daemon does not see it."""
 _FAREWELL: Final = b'{"jsonrpc":"2.0","id":null,"error"'
 
 Ending = tuple[int, str]
@@ -67,6 +70,7 @@ class Link:
         self._robot = robot
         self._limit = limit
         self._outbox = Outbox()
+        self._lateness = Lateness()
         self._malformed = 0
         self._own: set[asyncio.Task[None]] = set()
 
@@ -94,8 +98,7 @@ class Link:
         ending = next((way.result() for way in (asking, hearing) if way in done and way.result()), None)
         if ending is not None:
             await hang_up(self._page, *ending)
-        if self._outbox.lost:
-            LOGGER.info("a page of %s has read too slowly for %d notifications", self._robot.name, self._outbox.lost)
+        LOGGER.info("a page of %s has gone; %d notifications came too fast for it", self._robot.name, self._outbox.lost)
 
     def _give_up(self, reason: str) -> None:
         """Hang up on a page that would not read a farewell."""
@@ -123,6 +126,7 @@ class Link:
                 await daemon.drain()
             except ConnectionError:
                 return self._gone()
+            await asyncio.sleep(0)  # other pages get their turn, too
         return None
 
     def _taken(self, message: WSMessage) -> bytes:
@@ -133,7 +137,8 @@ class Link:
         """
         request = parse_request(message.data if message.type is WSMsgType.TEXT else "")
         request_id, name = request.get("id"), request["method"]
-        refused = refusal(name, self._limit)
+        self._lateness.look(request.pop(SENT, None), asyncio.get_running_loop().time())
+        refused = refusal(name, self._limit) or self._lateness.refusal(name)
         if refused is not None:
             self._answer(request_id, refused)
         elif name.startswith(PREFIX):

@@ -196,7 +196,7 @@ class Station:
         if transport is None:
             connection.close()
             return
-        LOGGER.info("a page at %s is connected to %s, to %s it", request.remote, robot.name, role)
+        LOGGER.info("a page at %s is connected to %s with the role %s", request.remote, robot.name, role)
         await Link(page, transport, robot, role).run(connection)
 
     # -- runs ---------------------------------------------------------------------------------------------------------

@@ -35,6 +35,7 @@ PHONE: dict[str, Any] = {
 }
 PANELS = ("drive", "map", "devices", "events", "objects", "paths", "runs", "simulation")
 TIMEOUT_S = 15.0
+READY_TO_DRIVE = "() => document.querySelectorAll('.stick:not([aria-disabled]), #slider-speed:enabled').length === 2"
 
 
 @contextmanager
@@ -128,6 +129,11 @@ class Operator:
         """Open a panel by its tab; returns when it shows."""
         self.page.click(f"nav a[href='#{panel}']")
         self.page.wait_for_selector(f"[data-panel={panel}]", state="visible")
+
+    def take_seat(self) -> None:
+        """Open the panel for driving; returns when it knows how this vehicle is driven, and lets somebody drive."""
+        self.go_to("drive")
+        self.until(lambda: self.page.evaluate(READY_TO_DRIVE), lambda: f"not to be driven: {self.text('#why-drive')}")
 
     def text(self, selector: str) -> str:
         """What stands in an element."""

@@ -206,9 +206,7 @@ def test_a_forged_request_of_a_watcher_is_refused_by_the_station(
     assert at_rest(robot.status())
 
 
-def test_a_watcher_may_stop_the_robot(
-    meet: Meet, guarded: Station, robot: Robot, expected_errors: list[str]
-) -> None:
+def test_a_watcher_may_stop_the_robot(meet: Meet, guarded: Station, robot: Robot, expected_errors: list[str]) -> None:
     expected_errors.append("emergency stop")
     operator = log_in(meet, guarded, TOKENS["watch"])
     operator.choose("max2d")

@@ -43,10 +43,7 @@ def moving(speed_m_s: float) -> Any:
 @pytest.fixture
 def driver(operator: Operator) -> Operator:
     """Somebody at the panel for driving."""
-    operator.go_to("drive")
-    operator.until(
-        lambda: operator.page.get_attribute(".stick", "aria-disabled") is None, lambda: operator.text("#why-drive")
-    )
+    operator.take_seat()
     return operator
 
 
@@ -145,7 +142,7 @@ def pad_driver(meet: Meet, robot: Robot) -> Operator:
     operator = meet()
     operator.context.add_init_script(FAKE_PAD)
     operator.open(robot.name)
-    operator.go_to("drive")
+    operator.take_seat()
     operator.sees("[data-panel=drive]", "Hold BTN_TL to drive")
     return operator
 
@@ -189,7 +186,7 @@ def test_the_semi_trailer_steers_by_the_stick(meet: Meet, fleet: Fleet) -> None:
     truck = fleet.robots["semitrailer"]
     operator = meet()
     operator.open("semitrailer")
-    operator.go_to("drive")
+    operator.take_seat()
     operator.sees("[data-panel=drive]", "aside: steering")
     operator.pulls(".stick", right=-0.7, up=0.7)
     driven = truck.comes_to(lambda status: status["vehicle"]["steering_deg"] > 5.0 and max(speeds(status)) > 0.05)
@@ -201,7 +198,7 @@ def test_the_semi_trailer_steers_by_the_stick(meet: Meet, fleet: Fleet) -> None:
 def test_a_thumb_on_a_phone_drives(meet: Meet, robot: Robot) -> None:
     operator = meet(**PHONE)
     operator.open(robot.name)
-    operator.go_to("drive")
+    operator.take_seat()
     operator.page.locator(".stick").scroll_into_view_if_needed()
     box = operator.page.locator(".stick").bounding_box()
     assert box is not None

@@ -34,7 +34,7 @@ def driver(meet: Meet, wire: Wire, robot: Robot) -> Operator:
     operator = meet(wire.url)
     operator.expects(*LOST)
     operator.open(robot.name)
-    operator.go_to("drive")
+    operator.take_seat()
     operator.pulls(".stick", right=0.0, up=0.6)
     robot.comes_to(lambda status: min(speeds(status)) > 0.1)
     return operator
@@ -76,6 +76,18 @@ def test_a_network_that_is_frozen_stops_the_robot_and_the_page_says_that_its_val
     driver.page.mouse.up()
 
 
+def test_a_network_that_loses_only_what_the_page_sends_stops_the_robot_and_the_page_says_so(
+    driver: Operator, wire: Wire, robot: Robot
+) -> None:
+    wire.freeze("up")
+    with at_rest_from_now_on(robot):
+        driver.sees("#notes", "let go, and hold it again to drive")
+        driver.sees("#state", "idle")
+        wire.thaw()
+        driver.page.wait_for_timeout(500.0)
+    driver.page.mouse.up()
+
+
 def test_a_network_that_is_frozen_for_long_is_given_up_and_comes_back(
     driver: Operator, wire: Wire, robot: Robot
 ) -> None:
@@ -96,7 +108,7 @@ def test_after_the_network_is_back_the_robot_drives_when_the_stick_is_let_go_of_
     wire.mend()
     driver.sees("#connection", "^.?\\s?connected")
     driver.page.mouse.up()
-    driver.until(lambda: driver.page.get_attribute(".stick", "aria-disabled") is None, lambda: driver.text("#message"))
+    driver.take_seat()
     driver.pulls(".stick", right=0.0, up=0.6)
     robot.comes_to(lambda status: min(speeds(status)) > 0.1)
     driver.page.mouse.up()

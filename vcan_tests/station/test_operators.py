@@ -16,7 +16,7 @@ MOVING_M_S = 0.1
 @pytest.fixture
 def first(operator: Operator, robot: Robot) -> Operator:
     """Somebody who drives by the stick, and holds it."""
-    operator.go_to("drive")
+    operator.take_seat()
     operator.pulls(".stick", right=0.0, up=0.6)
     robot.comes_to(lambda status: min(speeds(status)) > MOVING_M_S)
     return operator
@@ -56,7 +56,7 @@ def test_a_takeover_stops_the_first_and_both_see_it(first: Operator, second: Ope
     first.sees("#holder", r"(?<!you) has the robot")
     first.sees("#notes", "has the robot|taken the robot over")
     first.page.mouse.up()
-    second.go_to("drive")
+    second.take_seat()
     second.pulls(".stick", right=0.0, up=0.6)
     robot.comes_to(lambda status: min(speeds(status)) > MOVING_M_S)
     second.page.mouse.up()

@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 PIECE_BYTES = 65_536
 Way = Literal["up", "down"]
+WAYS: tuple[Way, ...] = ("up", "down")
 
 
 class Wire:
@@ -30,20 +31,26 @@ class Wire:
         self._open = True
         self._writers: set[asyncio.StreamWriter] = set()
         self._loop = asyncio.new_event_loop()
-        self._flows = asyncio.Event()
-        self._flows.set()
+        self._flows: dict[Way, asyncio.Event] = {"up": asyncio.Event(), "down": asyncio.Event()}
+        self.thaw()
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
         self._thread.start()
         self._server = self._do(asyncio.start_server(self._serve, "127.0.0.1", 0))
         self.url = f"http://127.0.0.1:{self._server.sockets[0].getsockname()[1]}/"
 
-    def freeze(self) -> None:
-        """Let nothing through any more, as a radio link does that is lost; nobody is told."""
-        self._loop.call_soon_threadsafe(self._flows.clear)
+    def freeze(self, *ways: Way) -> None:
+        """Let nothing through any more, as a radio link does that is lost; nobody is told.
+
+        Args:
+            ways: that are lost; both where none is named.
+        """
+        for way in ways or WAYS:
+            self._loop.call_soon_threadsafe(self._flows[way].clear)
 
     def thaw(self) -> None:
         """Let through what has waited, and what comes."""
-        self._loop.call_soon_threadsafe(self._flows.set)
+        for flow in self._flows.values():
+            self._loop.call_soon_threadsafe(flow.set)
 
     def cut(self) -> None:
         """Reset every connection, and each new one, until it is mended."""
@@ -73,7 +80,7 @@ class Wire:
 
     async def _end(self) -> None:
         self._server.close()
-        self._flows.set()
+        self.thaw()
         self._cut()
         tasks = asyncio.all_tasks() - {asyncio.current_task()}
         for task in tasks:
@@ -101,7 +108,7 @@ class Wire:
     async def _carry(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, way: Way) -> None:
         with contextlib.suppress(ConnectionError):
             while piece := await reader.read(PIECE_BYTES):
-                await self._flows.wait()
+                await self._flows[way].wait()
                 self.bytes_of[way] += len(piece)
                 writer.write(piece)
                 await writer.drain()

@@ -20,7 +20,7 @@ from daemon.runtime.notify import FEEDS_PER_TIMEOUT
 ROOT = Path(__file__).parents[2]
 INSTALL = ROOT / "packaging" / "install.sh"
 UNINSTALL = ROOT / "packaging" / "uninstall.sh"
-UNITS = ("canhelm@.service", "canhelm@.socket", "can@.service")
+UNITS = ("canhelm@.service", "canhelm@.socket", "canhelm-station.service", "can@.service")
 MAINTAINER_SCRIPTS = sorted((ROOT / "packaging" / "debian").glob("p*"))
 MOST_EXPOSED = 15
 """Ten times the exposure that `systemd-analyze security` may find at most."""
@@ -188,20 +188,30 @@ def test_scripts_are_sound_shell_and_can_be_run(script: Path) -> None:
 
 
 @pytest.mark.systemd
-@pytest.mark.parametrize("unit", ["canhelm@max2d.service", "canhelm@max2d.socket", "can@can0.service"])
+@pytest.mark.parametrize(
+    "unit", ["canhelm@max2d.service", "canhelm@max2d.socket", "canhelm-station.service", "can@can0.service"]
+)
 def test_systemd_finds_nothing_to_complain_about(unit: str, tmp_path: Path) -> None:
     _with_stand_in(tmp_path)
     assert _verify(unit, tmp_path) == (0, "")
 
 
 @pytest.mark.systemd
-@pytest.mark.parametrize("example", ["serial.conf", "tcp.conf", "real-time.conf"])
-def test_systemd_understands_each_drop_in(example: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("example", "unit", "instance"),
+    [
+        ("serial.conf", "canhelm@.service", "canhelm@max2d.service"),
+        ("tcp.conf", "canhelm@.service", "canhelm@max2d.service"),
+        ("real-time.conf", "canhelm@.service", "canhelm@max2d.service"),
+        ("station-lan.conf", "canhelm-station.service", "canhelm-station.service"),
+    ],
+)
+def test_systemd_understands_each_drop_in(example: str, unit: str, instance: str, tmp_path: Path) -> None:
     _with_stand_in(tmp_path)
-    drop_ins = tmp_path / "usr/lib/systemd/system/canhelm@.service.d"
+    drop_ins = tmp_path / f"usr/lib/systemd/system/{unit}.d"
     drop_ins.mkdir()
     (drop_ins / example).write_bytes((ROOT / "systemd/examples" / example).read_bytes())
-    assert _verify("canhelm@max2d.service", tmp_path) == (0, "")
+    assert _verify(instance, tmp_path) == (0, "")
 
 
 def _with_stand_in(folder: Path) -> None:
@@ -221,7 +231,8 @@ def _verify(unit: str, folder: Path) -> tuple[int, str]:
 
 
 @pytest.mark.systemd
-def test_the_service_is_hardly_exposed() -> None:
+@pytest.mark.parametrize("unit", ["canhelm@.service", "canhelm-station.service"])
+def test_the_service_is_hardly_exposed(unit: str) -> None:
     command = ["systemd-analyze", "security", "--offline=true", f"--threshold={MOST_EXPOSED}", "--no-pager"]
-    analysed = subprocess.run([*command, str(ROOT / "systemd/canhelm@.service")], capture_output=True, text=True)
+    analysed = subprocess.run([*command, str(ROOT / "systemd" / unit)], capture_output=True, text=True)
     assert analysed.returncode == 0, analysed.stdout

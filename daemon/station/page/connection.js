@@ -82,7 +82,8 @@ export class Connection extends EventTarget {
       return Promise.reject(new RpcError(`${method} was not sent: no connection to the robot`, 0, { remedy }));
     }
     const id = ++this.#lastId;
-    this.#socket.send(JSON.stringify({ jsonrpc: "2.0", id, method, params }));
+    // by sent_ms the station tells a command that hung in the network from a fresh one
+    this.#socket.send(JSON.stringify({ jsonrpc: "2.0", id, method, params, sent_ms: Date.now() }));
     return new Promise((resolve, reject) => {
       const timer = timeout_ms ? setTimeout(() => this.#giveUp(id, method, timeout_ms), timeout_ms) : 0;
       this.#pending.set(id, { resolve, reject, timer });

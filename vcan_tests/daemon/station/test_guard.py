@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 import logging
+import re
 import time
 
 import pytest
 from aiohttp import WSServerHandshakeError
+from hypothesis import given
+from hypothesis import strategies as st
 
 from daemon.api.parameters import Role
 from daemon.station.guard import Guard
@@ -72,6 +75,12 @@ async def test_nothing_but_the_page_is_served(visitor: Visitor, path: str) -> No
 async def test_the_page_and_its_modules_are_served_as_what_they_are(visitor: Visitor) -> None:
     assert (await visitor.get("/")).content_type == "text/html"
     assert "javascript" in (await visitor.get("/page/main.js")).content_type
+
+
+@given(st.from_regex(r"[a-z0-9.:@/\[\]\\?#-]*(localhost|127\.0\.0\.1|\[::1\])[a-z0-9.:@/\[\]\\?#-]*", fullmatch=True))
+def test_no_name_that_merely_looks_like_this_machine_is_taken_for_it(host: str) -> None:
+    if Guard("127.0.0.1").is_here(host):
+        assert re.fullmatch(r"(localhost\.?|127(\.\d{1,3}){3}\.?|\[::1\])(:\d{1,5})?", host)
 
 
 def test_a_station_in_the_network_answers_to_its_addresses_and_names() -> None:

@@ -71,6 +71,18 @@ async def test_what_a_page_moves_stops_when_its_lease_runs_out(visitor: Visitor,
     assert backend.stopped
 
 
+async def test_a_move_that_hung_in_the_network_does_not_reach_the_daemon(
+    visitor: Visitor, backend: FakeBackend
+) -> None:
+    page = await visitor.open()
+    page.sent_ms = 10_000.0
+    await page.ask("hello")
+    page.sent_ms = 2_000.0
+    answer = await page.ask("motor.velocity", **MOVE)
+    assert "on its way for" in answer["error"]["message"]
+    assert not backend.calls
+
+
 async def test_a_stop_that_is_sent_last_is_carried_out(visitor: Visitor, backend: FakeBackend) -> None:
     page = await visitor.open()
     await page.send("stop")

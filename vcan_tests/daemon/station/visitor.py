@@ -18,16 +18,22 @@ class Page:
 
     Args:
         socket: its WebSocket.
+
+    Attributes:
+        sent_ms: when it says that it sends what it sends; None: it does not say.
     """
 
     def __init__(self, socket: ClientWebSocketResponse) -> None:
         self.socket = socket
+        self.sent_ms: float | None = None
         self._last_id = 0
 
     async def send(self, method: str, **params: Any) -> int:
         """Send a request; its id."""
         self._last_id += 1
         request = {"jsonrpc": "2.0", "id": self._last_id, "method": method, "params": params}
+        if self.sent_ms is not None:
+            request["sent_ms"] = self.sent_ms
         await self.socket.send_str(json.dumps(request))
         return self._last_id
 
