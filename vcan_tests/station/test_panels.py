@@ -33,9 +33,15 @@ def turning(status: Status) -> bool:
     return bool(node["velocity_rpm"] > 0.8 * SLOW_RPM)
 
 
+def sees_devices(operator: Operator) -> None:
+    """Open the panel of devices; returns when their values are drawn, and nothing moves any more."""
+    operator.go_to("devices")
+    operator.sees(CARD, r"Velocity\s+\S+ rpm")
+
+
 def jogs(operator: Operator, robot: Robot) -> None:
     """Press the button that turns the motor, and wait until it turns."""
-    operator.go_to("devices")
+    sees_devices(operator)
     operator.page.locator(FORWARD).scroll_into_view_if_needed()
     operator.page.hover(FORWARD)
     operator.page.mouse.down()
@@ -78,7 +84,7 @@ def test_a_motor_that_is_jogged_stops_when_the_page_is_gone(operator: Operator, 
 
 
 def test_a_motor_that_is_jogged_by_a_key_stops_when_the_focus_goes_elsewhere(operator: Operator, robot: Robot) -> None:
-    operator.go_to("devices")
+    sees_devices(operator)
     operator.page.focus(FORWARD)
     operator.page.keyboard.down("Enter")
     robot.comes_to(turning, within_s=5.0)
@@ -88,7 +94,7 @@ def test_a_motor_that_is_jogged_by_a_key_stops_when_the_focus_goes_elsewhere(ope
 
 
 def test_a_jog_that_is_too_fast_is_refused_in_words(operator: Operator, robot: Robot) -> None:
-    operator.go_to("devices")
+    sees_devices(operator)
     operator.page.fill(f"{CARD} input[type=number]", "90000")
     operator.page.hover(FORWARD)
     operator.page.mouse.down()

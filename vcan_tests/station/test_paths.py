@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ pytestmark = pytest.mark.station
 
 ROBOTS = ("semitrailer",)
 PANEL = "[data-panel=paths]"
-MAP = "[data-panel=map] canvas"
+MAP, POINTER = "[data-panel=map] canvas", "[data-panel=map] .map-cursor"
 CURSOR = re.compile(r"x (.?[\d.]+) m, y (.?[\d.]+) m")
 LARGEST_ERROR_M = 0.05
 """Off the path on the way; the drive would end by itself at 0.6 m."""
@@ -47,20 +48,23 @@ def insert(operator: Operator, kind: str, **numbers: str) -> None:
     operator.page.keyboard.press("Tab")
 
 
-def places(operator: Operator) -> tuple[Any, Any]:
-    """From a place of the floor to one of the map, and its box: what the pointer shows at two of its places."""
+def pointed(operator: Operator, x: float, y: float) -> tuple[float, float, float, float]:
+    """A place of the page on the map, and the place of the floor that the map tells for it."""
+    before = operator.text(POINTER)
+    operator.page.mouse.move(x, y)
+    operator.until(lambda: operator.text(POINTER) not in ("", before), lambda: "no place is shown")
+    found = CURSOR.search(operator.text(POINTER).replace("−", "-"))
+    assert found is not None
+    return x, y, float(found[1]), float(found[2])
+
+
+def places(operator: Operator) -> Callable[[float, float], tuple[float, float]]:
+    """From a place of the floor to one of the page, by what the map tells at two of its places."""
     box = operator.page.locator(MAP).bounding_box()
     assert box is not None
-    shown = []
-    for share in (0.25, 0.75):
-        x, y = box["x"] + share * box["width"], box["y"] + share * box["height"]
-        operator.page.mouse.move(x, y)
-        operator.sees("[data-panel=map] .map-cursor", "x")
-        found = CURSOR.search(operator.text("[data-panel=map] .map-cursor").replace("−", "-"))
-        assert found is not None
-        shown.append((x, y, float(found[1]), float(found[2])))
-    (x1, y1, a1, b1), (x2, y2, a2, b2) = shown
-    return lambda a, b: (x1 + (a - a1) / (a2 - a1) * (x2 - x1), y1 + (b - b1) / (b2 - b1) * (y2 - y1)), box
+    first, second = (pointed(operator, box["x"] + s * box["width"], box["y"] + s * box["height"]) for s in (0.25, 0.75))
+    (x1, y1, a1, b1), (x2, y2, a2, b2) = first, second
+    return lambda a, b: (x1 + (a - a1) / (a2 - a1) * (x2 - x1), y1 + (b - b1) / (b2 - b1) * (y2 - y1))
 
 
 def test_a_path_is_drawn_and_followed_backwards_to_its_end(drawer: Operator, robot: Robot) -> None:
@@ -68,7 +72,7 @@ def test_a_path_is_drawn_and_followed_backwards_to_its_end(drawer: Operator, rob
     drawer.page.get_by_role("button", name="Follow the vehicle").click()
     drawer.page.get_by_role("button", name="Zoom out").click()
     trailer = robot.status()["vehicle"]["trailer"]
-    on_map, _ = places(drawer)
+    on_map = places(drawer)
     drawer.page.click("button[data-tool=line]")
     drawer.page.mouse.click(*on_map(trailer["x_m"] - 0.8, trailer["y_m"]))
     drawer.page.click("button[data-tool=arc]")
@@ -112,7 +116,7 @@ def test_the_end_of_a_piece_is_dragged_and_snaps(drawer: Operator) -> None:
     press(drawer, "Fit", "[data-panel=map]")
     drawer.page.click("button[data-tool=move]")
     pose = drawer.page.evaluate("async () => (await import('/page/station.js')).station.status.vehicle.pose")
-    on_map, _ = places(drawer)
+    on_map = places(drawer)
     heading = drawer.page.evaluate("angle => [Math.cos(angle), Math.sin(angle)]", pose["yaw_deg"] * 3.14159265 / 180)
     drawer.page.mouse.move(*on_map(pose["x_m"] + heading[0], pose["y_m"] + heading[1]))
     drawer.page.mouse.down()
