@@ -21,6 +21,13 @@ def named_in(name: str) -> set[str]:
     }
 
 
+def folder_of(room: str) -> str:
+    """Where the page's sentences look for a room."""
+    if room.startswith(("test_service_", "test_upgrade_")):
+        return "systemd"
+    return "station" if room == "test_network.py" else "daemon"
+
+
 @pytest.mark.parametrize(("room", "test"), HELD_BY)
 def test_a_promise_is_held_by_a_test_that_exists(room: str, test: str) -> None:
     assert test in named_in(room)
@@ -28,8 +35,7 @@ def test_a_promise_is_held_by_a_test_that_exists(room: str, test: str) -> None:
 
 @pytest.mark.parametrize("room", sorted({room for room, _ in HELD_BY}))
 def test_a_test_is_where_the_commands_of_the_page_look_for_it(room: str) -> None:
-    folder = "systemd" if room.startswith(("test_service_", "test_upgrade_")) else "daemon"
-    assert list((ROOT / "vcan_tests" / folder).rglob(room))
+    assert list((ROOT / "vcan_tests" / folder_of(room)).rglob(room))
 
 
 def test_every_promise_names_what_holds_it() -> None:
