@@ -77,7 +77,8 @@ def test_a_path_is_drawn_and_followed_backwards_to_its_end(drawer: Operator, rob
     drawer.page.mouse.click(*on_map(trailer["x_m"] - 0.8, trailer["y_m"]))
     drawer.page.click("button[data-tool=arc]")
     drawer.page.mouse.click(*on_map(trailer["x_m"] - 1.6, trailer["y_m"] + 0.25))
-    assert drawer.page.locator(f"{PANEL} .path-pieces tbody tr").count() == 2
+    pieces = drawer.page.locator(f"{PANEL} .path-pieces tbody tr")
+    drawer.until(lambda: pieces.count() == 2, lambda: f"the path has {pieces.count()} pieces")
     drawer.sees(PANEL, "Can be driven")
     drawer.page.click("#path-drive")
     following = robot.comes_to(lambda status: status["vehicle"]["following"])["vehicle"]["following"]
