@@ -253,7 +253,7 @@ def open_socket(path: str | os.PathLike[str], timeout_s: float = 5.0) -> socket.
     except OSError as error:
         connection.close()
         raise DaemonNotRunning(
-            f"no daemon answers on {os.fspath(path)}: {error.strerror or error}", remedy=_how_to_start(Path(path))
+            f"no daemon answers on {os.fspath(path)}: {error.strerror or error}", remedy=how_to_start(Path(path))
         ) from None
     return connection
 
@@ -276,9 +276,11 @@ def _open_over_tcp(address: str, timeout_s: float) -> socket.socket:
     return connection
 
 
-def _how_to_start(path: Path) -> str:
+def how_to_start(path: Path) -> str:
+    """What to do where no daemon answers on a socket, which has the robot's name."""
     if path.parent in (SYSTEM_FOLDER, user_folder()):
-        return "start it: canhelm run --profile NAME (add --simulate without hardware), or systemctl start canhelm@NAME"
+        run = f"canhelm run --profile {path.stem} (add --simulate without hardware)"
+        return f"start it: {run}, or systemctl start canhelm@{path.stem}"
     return f"start it: canhelm run --profile NAME --socket {path} (add --simulate without hardware)"
 
 

@@ -14,7 +14,7 @@ from typing import Any, Final
 from aiohttp import WSMessage, WSMsgType, web
 
 from canhelm import protocol
-from canhelm.errors import CanhelmError, Refused, UsageError
+from canhelm.errors import CanhelmError, DaemonNotRunning, Refused, UsageError
 from daemon.api.parameters import Method, Role, validate
 from daemon.station.lateness import Lateness
 from daemon.station.limits import lowered, refusal
@@ -213,7 +213,18 @@ class Link:
                 return
 
     def _gone(self, farewell: str = "") -> Ending:
-        return NO_DAEMON, farewell or f"the daemon of {self._robot.name} hung up"
+        if farewell:
+            return NO_DAEMON, farewell
+        told = f"the daemon of {self._robot.name} hung up"
+        self._answer(None, DaemonNotRunning(told, remedy=protocol.how_to_start(self._robot.socket)))
+        return NO_DAEMON, told
+
+
+async def turn_away(page: web.WebSocketResponse, error: CanhelmError) -> None:
+    """Tell a page why it gets no daemon and what to do, for which the reason of a farewell has no room; hang up."""
+    line = protocol.make_error(None, error.rpc_code, error.message, error.data())
+    await page.send_str(line.decode().rstrip())
+    await hang_up(page, NO_DAEMON, error.message)
 
 
 async def hang_up(page: web.WebSocketResponse, code: int, reason: str) -> None:

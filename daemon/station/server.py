@@ -18,7 +18,7 @@ from daemon.api.parameters import Role
 from daemon.api.tokens import Tokens
 from daemon.station import runs
 from daemon.station.guard import EVERYWHERE, Guard, own_address, say_what_is_allowed
-from daemon.station.link import NO_DAEMON, Link, hang_up
+from daemon.station.link import Link, hang_up, turn_away
 from daemon.station.robots import Robot, Robots
 from daemon.station.sessions import Sessions
 
@@ -190,7 +190,7 @@ class Station:
             robot = self._robots.find(request.match_info["robot"])
             connection = await asyncio.to_thread(protocol.open_socket, robot.socket, CONNECT_S)
         except CanhelmError as error:
-            await hang_up(page, NO_DAEMON, error.message)
+            await turn_away(page, error)
             return
         transport = request.transport
         if transport is None:

@@ -5,6 +5,7 @@ const LONGEST_PAUSE_MS = 2000;
 /** Silence after which a connection is given up, though the network has not told that it is gone. */
 const SILENCE_MS = 4000;
 const STATUS_RATE_HZ = 20;
+const NO_STATION = "no connection to the control station";
 
 /** What the daemon or the station answered instead of a result, or why there was no answer. */
 export class RpcError extends Error {
@@ -26,8 +27,8 @@ export class RpcError extends Error {
 }
 
 /**
- * Dispatches `open` (detail: hello, methods, shape), `closed` (detail: reason), `status` and `event` (detail: as the
- * daemon told it).
+ * Dispatches `open` (detail: hello, methods, shape), `closed` (detail: reason, remedy), `status` and `event` (detail:
+ * as the daemon told it).
  */
 export class Connection extends EventTarget {
   #socket = null;
@@ -36,6 +37,8 @@ export class Connection extends EventTarget {
   #pause_ms = FIRST_PAUSE_MS;
   #again = 0;
   #watch = 0;
+  /** The error that is no answer: why the other end hangs up. */
+  #farewell = null;
 
   /** @param {string} robot name of the robot */
   constructor(robot) {
@@ -55,10 +58,11 @@ export class Connection extends EventTarget {
     address.protocol = address.protocol.replace("http", "ws");
     const socket = new WebSocket(address);
     this.#socket = socket;
+    this.#farewell = null;
     this.lastHeard_ms = performance.now();
     socket.onopen = () => this.#greet(socket);
     socket.onmessage = (message) => this.#take(message.data);
-    socket.onclose = (end) => this.#lose(end.reason || "no connection to the control station");
+    socket.onclose = (end) => this.#lose(this.#farewell?.message ?? (end.reason || NO_STATION));
     this.#watch = setInterval(() => this.#lookForSilence(), SILENCE_MS / 4);
   }
 
@@ -122,6 +126,7 @@ export class Connection extends EventTarget {
       this.#tell(message.method, message.params);
     } else if (message.error) {
       const { code, message: told, data } = message.error;
+      if (message.id == null) this.#farewell = new RpcError(told, code, data);
       this.#settle(message.id)?.reject(new RpcError(told, code, data));
     } else {
       this.#settle(message.id)?.resolve(message.result);
@@ -152,7 +157,7 @@ export class Connection extends EventTarget {
       const remedy = "it comes back by itself";
       this.#settle(id).reject(new RpcError("the connection to the robot was lost", 0, { remedy }));
     }
-    this.#tell("closed", { reason });
+    this.#tell("closed", { reason, remedy: this.#farewell?.remedy ?? "" });
   }
 
   #tell(kind, detail) {

@@ -1,4 +1,4 @@
-/** What is told to people in passing; alarms stay until somebody has read them. */
+/** What is told to people in passing; errors stay longer, and what has a key until it is unsaid. */
 
 import { h } from "./dom.js";
 
@@ -11,16 +11,23 @@ export function showNotices(station) {
   const notes = document.getElementById("notes");
   const alarms = document.getElementById("alarms");
   station.on("said", (said) => add(said.severity === "error" ? alarms : notes, said));
+  station.on("unsaid", (key) => find(alarms, key)?.remove());
 }
 
-function add(list, { text, severity, remedy }) {
-  const same = [...list.children].find((notice) => notice.dataset.text === text);
-  same?.remove();
+function find(list, key) {
+  return [...list.children].find((notice) => notice.dataset.key === key);
+}
+
+function add(list, { text, severity, remedy, key }) {
+  find(list, key ?? text)?.remove();
   const close = h("button", { type: "button", class: "close", "aria-label": "Close this notice" }, "×");
   const words = h("p", {}, h("strong", {}, `${WORDS[severity]}: `), text, remedy && h("span", {}, ` – ${remedy}`));
-  const notice = h("div", { class: `notice ${severity}`, "data-text": text }, words, close);
+  const notice = h("div", { class: `notice ${severity}`, "data-key": key ?? text }, words, close);
   close.addEventListener("click", () => notice.remove());
   list.append(notice);
-  while (list.children.length > MOST) list.firstElementChild.remove();
+  if (key) return;
+  notice.dataset.passing = "";
+  const passing = list.querySelectorAll("[data-passing]");
+  if (passing.length > MOST) passing[0].remove();
   setTimeout(() => notice.remove(), SHOWN_MS[severity]);
 }

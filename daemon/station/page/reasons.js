@@ -1,5 +1,7 @@
 /** Why something cannot be done now, for people. */
 
+import { whoHas } from "./words.js";
+
 const RANK = ["stop", "watch", "drive", "configure"];
 /** Methods of the station itself that change something. */
 const STATION_ROLES = {
@@ -68,6 +70,6 @@ function reasonOfState({ status, stale, holds }, method, told) {
   const { state, message, holder } = status;
   if (state in STANDING) return STANDING[state];
   if (method in NOT_OF_ALL && (state === "waiting" || state === "booting")) return message || `the vehicle is ${state}`;
-  if (told.needs_lease && holder && !holds) return `${holder.client} has the robot: wait, or take it over`;
+  if (told.needs_lease && holder && !holds) return `${whoHas(holder)} has the robot: wait, or take it over`;
   return null;
 }

@@ -3,6 +3,7 @@
 import { Connection } from "./connection.js";
 import { Lease } from "./lease.js";
 import { reasonAgainst } from "./reasons.js";
+import { StopAlarm } from "./stop_alarm.js";
 
 /** Age at which values are stale. */
 const STALE_MS = 1000;
@@ -28,9 +29,12 @@ class Station {
     this.stale = true;
     /** Why there is no connection. */
     this.reason = "";
+    /** What to do about that; empty where it comes back by itself. */
+    this.remedy = "";
     /** The path in the editor: start and pieces; null where there is none. */
     this.path = null;
     this.lease = new Lease(this);
+    this.stopAlarm = new StopAlarm(this);
   }
 
   /** Watch the age of the values from now on. */
@@ -41,7 +45,7 @@ class Station {
   /**
    * Hear of something.
    *
-   * @param {"status"|"event"|"shape"|"connected"|"stale"|"robot"|"path"|"said"} kind of what
+   * @param {"status"|"event"|"shape"|"connected"|"stale"|"robot"|"path"|"said"|"unsaid"} kind of what
    * @param {function(any): void} listener is given the news, where there is more than the station itself holds
    */
   on(kind, listener) {
@@ -74,6 +78,7 @@ class Station {
     this.#connection?.close();
     this.robot = robot;
     this.status = this.shape = this.hello = this.path = null;
+    this.reason = this.remedy = "";
     this.#emit("robot");
     if (robot) this.#connect(robot);
   }
@@ -104,9 +109,14 @@ class Station {
     return reasonAgainst(this, method);
   }
 
-  /** Tell people something: info, warning or error, and what to do. */
-  say(text, severity = "info", remedy = "") {
-    this.#emit("said", { text, severity, remedy });
+  /** Tell people something: info, warning or error, and what to do; with a key it stays until that is unsaid. */
+  say(text, severity = "info", remedy = "", key = null) {
+    this.#emit("said", { text, severity, remedy, key });
+  }
+
+  /** Take back what was said with a key. */
+  unsay(key) {
+    this.#emit("unsaid", key);
   }
 
   /**
@@ -135,7 +145,7 @@ class Station {
     const connection = new Connection(robot);
     this.#connection = connection;
     connection.addEventListener("open", ({ detail }) => this.#opened(detail));
-    connection.addEventListener("closed", ({ detail }) => this.#closed(connection, detail.reason));
+    connection.addEventListener("closed", ({ detail }) => this.#closed(connection, detail));
     connection.addEventListener("status", ({ detail }) => this.#took(detail));
     connection.addEventListener("event", ({ detail }) => this.#emit("event", detail));
     connection.open();
@@ -146,15 +156,15 @@ class Station {
     this.shape = shape;
     this.methods = new Map(methods.map((method) => [method.name, method]));
     this.connected = true;
-    this.reason = "";
+    this.reason = this.remedy = "";
     this.#emit("connected");
     this.#emit("shape", shape);
   }
 
-  #closed(connection, reason) {
+  #closed(connection, { reason, remedy }) {
     if (connection !== this.#connection) return;
     this.connected = false;
-    this.reason = reason;
+    [this.reason, this.remedy] = [reason, remedy];
     this.#emit("connected");
     this.#lookAtAge();
   }

@@ -4,6 +4,7 @@
 const ANSWER_MS = 2000;
 /** Longest time from a pointer's press to the click that it makes. */
 const CLICK_MS = 1000;
+const LOOK = "look at the robot; stop it there if it moves";
 /** Inputs in which a space is something to write. */
 const WRITING_TYPES = "[type=text], [type=search], [type=password], [type=url], :not([type])";
 const WRITING = `textarea, [contenteditable], input:is(${WRITING_TYPES})`;
@@ -20,7 +21,7 @@ export class Stopper {
   /** Stop by these buttons, and by the space bar wherever the focus is. */
   watch(stop, estop) {
     pressed(stop, () => this.send("stop"));
-    pressed(estop, () => this.send("estop", { reason: "pressed on the control station's page" }));
+    pressed(estop, () => this.send("estop", { reason: `pressed on ${this.#page}` }));
     document.addEventListener("keydown", (event) => this.#onKey(event), { capture: true });
     document.addEventListener("keyup", swallowSpace, { capture: true });
   }
@@ -35,17 +36,17 @@ export class Stopper {
     const station = this.#station;
     const what = method === "stop" ? "stop" : "emergency stop";
     if (!station.sends) {
-      station.say(`${what} NOT SENT: no connection to the robot!`, "error", "stop it at the robot itself");
+      station.stopAlarm.raise(`${what} NOT SENT`, "no connection to the robot!", "stop it at the robot itself");
       return;
     }
     const answer = station.call(method, params, { timeout_ms: 15_000 });
     const late = setTimeout(() => this.#tellLate(what), ANSWER_MS);
     try {
       const told = await answer;
-      const done = told.message || `the robot is ${told.state}`;
-      station.say(method === "stop" ? `stopped: ${done}` : done, "warning");
+      station.stopAlarm.end();
+      if (method === "stop") station.say(`stopped: ${told.message || `the robot is ${told.state}`}`, "warning");
     } catch (error) {
-      station.say(`${what} not confirmed: ${error.message}`, "error", "look at the robot; stop it there if it moves");
+      station.stopAlarm.raise(`${what} not confirmed`, error.message, LOOK);
     } finally {
       clearTimeout(late);
     }
@@ -57,8 +58,12 @@ export class Stopper {
       this.#station.say(`${what}: the robot is coming to rest`, "warning");
     } else {
       const why = stale ? "nothing is heard from the robot" : `it is ${status.state}`;
-      this.#station.say(`${what} sent, NO ANSWER YET: ${why}`, "error", "look at the robot; stop it there if it moves");
+      this.#station.stopAlarm.raise(`${what} sent, NO ANSWER YET`, why, LOOK);
     }
+  }
+
+  get #page() {
+    return this.#station.hello?.name ?? "the control station's page";
   }
 
   #onKey(event) {
