@@ -1,21 +1,21 @@
 /** Having a path driven: forwards or backwards, how fast, how far it is, and what came of it. */
 
 import { allow, h, number, text } from "./dom.js";
-import { field, put } from "./fields.js";
+import { field, put, putBack, settleWriting } from "./fields.js";
 
 const METHOD = "drive.path";
 const HINT =
   "Backwards exchanges forward and backward in the whole path. The page holds the drive: hide or close it, and the "
   + "vehicle comes to rest.";
 
-/** The controls under the editor; `speed_m_s()` and `lasts(length_m)` are of use to the check. */
+/** The controls under the editor. Attribute `speed_m_s`: what is asked for; null for as fast as the vehicle may. */
 export class Following {
   #driving = false;
 
   constructor(station, editor, check) {
-    [this.station, this.editor, this.check] = [station, editor, check];
+    [this.station, this.editor, this.check, this.speed_m_s] = [station, editor, check, null];
     const limits = { min: 0.001, placeholder: "largest" };
-    this.speed = field("Speed in metres a second", limits, () => check().look());
+    this.speed = field("Speed in metres a second", limits, (speed_m_s) => this.#ask(speed_m_s));
     this.ways = ["forwards", "backwards"].map((way) => this.#way(way));
     const drive = { type: "button", class: "main", id: "path-drive", onclick: () => this.#drive() };
     this.driveButton = h("button", drive, "Drive the path");
@@ -52,23 +52,26 @@ export class Following {
     );
   }
 
-  /** The speed that is asked for; null for as fast as the vehicle may. */
-  speed_m_s() {
-    return this.speed.value === "" || !this.speed.checkValidity() ? null : this.speed.valueAsNumber;
+  #ask(speed_m_s) {
+    this.speed_m_s = speed_m_s;
+    this.check().look();
   }
 
   /** How long a way lasts at least, in words. */
   lasts(length_m) {
     const { limits } = this.station.shape ?? {};
     const fastest = this.editor.exchanged && limits?.backward_m_s ? limits.backward_m_s : limits?.speed_m_s;
-    const speed_m_s = Math.min(this.speed_m_s() ?? Infinity, fastest ?? Infinity);
+    const speed_m_s = Math.min(this.speed_m_s ?? Infinity, fastest ?? Infinity);
     const least_s = length_m / speed_m_s;
     return least_s > 0 ? `at least ${number(least_s, least_s < 10 ? 1 : 0)} s` : "";
   }
 
   // --- driving --------------------------------------------------------------------------------------------------
 
+  /** A click may come before what was typed is drawn: it drives what stands in the boxes, or nothing. */
   async #drive() {
+    settleWriting();
+    if (this.#against()) return;
     const { robot } = this.station;
     this.#driving = true;
     text(this.result, "");
@@ -101,20 +104,20 @@ export class Following {
   // --- showing --------------------------------------------------------------------------------------------------
 
   show() {
-    const { exchanged, entries } = this.editor;
+    const { exchanged } = this.editor;
     for (const input of this.ways) input.checked = (input.value === "backwards") === exchanged;
     const noReverse = this.station.shape?.path?.smallest_radius_backward_m === null;
     allow(this.ways[1], noReverse ? "this vehicle cannot drive backwards" : null);
-    const against = this.#against(entries);
+    const against = this.#against();
     allow(this.driveButton, against);
     this.stopButton.disabled = !this.station.connected;
     text(this.reason, this.#driving ? "" : against ?? "");
     this.#showProgress(this.station.status?.vehicle?.following ?? null);
   }
 
-  #against(entries) {
+  #against() {
     if (this.#driving) return "it is driving";
-    if (!entries.length) return "there is no path yet";
+    if (!this.editor.entries.length) return "there is no path yet";
     const { kind, message } = this.check().verdict;
     return this.station.cannot(METHOD) ?? (kind === "bad" ? message : null);
   }
@@ -131,7 +134,9 @@ export class Following {
 
   /** The next robot has other limits. */
   forget() {
+    putBack(this.element);
     put(this.speed, "");
+    this.speed_m_s = null;
     text(this.result, "");
     this.editor.set("exchanged", false);
   }

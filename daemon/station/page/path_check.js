@@ -20,11 +20,13 @@ export class PathCheck extends EventTarget {
   /**
    * @param station the station.
    * @param editor whose path is checked.
-   * @param speed_m_s tells the speed that is asked for; null for as fast as the vehicle may.
+   * @param boxes tell by `speed_m_s()` the speed that is asked for, null for as fast as the vehicle may, and by
+   *     `wrong()` in words what is wrong in a box, so that the path is not as it is written; null where nothing is.
    */
-  constructor(station, editor, speed_m_s) {
+  constructor(station, editor, { speed_m_s, wrong }) {
     super();
-    [this.#station, this.#editor, this.speed_m_s, this.verdict] = [station, editor, speed_m_s, { kind: "none" }];
+    [this.#station, this.#editor, this.verdict] = [station, editor, { kind: "none" }];
+    [this.speed_m_s, this.wrong] = [speed_m_s, wrong];
     editor.addEventListener("change", () => this.look());
     for (const kind of ["connected", "shape", "robot"]) station.on(kind, () => this.again());
     station.on("status", () => this.#watchState());
@@ -42,11 +44,13 @@ export class PathCheck extends EventTarget {
 
   /** Ask, if it has not been asked for just this; a moment later, so that a drag asks when it pauses. */
   look() {
-    const asked = JSON.stringify(this.params());
+    const wrong = this.wrong();
+    const asked = JSON.stringify([wrong, this.params()]);
     if (asked === this.#asked) return;
     this.#asked = asked;
     clearTimeout(this.#timer);
     if (!this.#editor.entries.length) return this.#tell({ kind: "none" });
+    if (wrong) return this.#tell({ kind: "bad", message: wrong, remedy: "mend it, or undo it", piece: null });
     this.#tell({ kind: "asking" });
     this.#timer = setTimeout(() => this.#ask(asked), PAUSE_MS);
   }

@@ -11,6 +11,7 @@ const MOST_PIECES = 500;
 const NEW_LINE = { kind: "line", length_m: 1 };
 const NEW_ARC = { kind: "arc", radius_m: 1.5, arc_deg: 45 };
 const EMPTY = { description: "", start: null, entries: [] };
+let entriesMade = 0;
 
 const editors = new WeakMap();
 
@@ -27,10 +28,12 @@ const stepped = (value, step) => Math.round(value / step) * step;
 const rounded = (value, digits) => Number(value.toFixed(digits));
 
 /**
- * Dispatches `change` whenever the path, the choice in it or the way to drive it is another one.
+ * Dispatches `change` whenever the path, the choice in it or the way to drive it is another one, and before something
+ * is undone `undo`, which may be prevented.
  *
  * entries: {kind: "line", length_m, backward} and {kind: "arc", radius_m, arc_deg, backward}, each going on where the
- * one before it ends. start: {x_m, y_m, heading_deg}, or null for a path that begins where the vehicle is.
+ * one before it ends, and each with a number of its own as its `id`. start: {x_m, y_m, heading_deg}, or null for a
+ * path that begins where the vehicle is.
  */
 class PathEditor extends EventTarget {
   #station;
@@ -113,7 +116,7 @@ class PathEditor extends EventTarget {
   }
 
   undo() {
-    this.#step(this.#before, this.#undone);
+    if (this.dispatchEvent(new Event("undo", { cancelable: true }))) this.#step(this.#before, this.#undone);
   }
 
   redo() {
@@ -160,7 +163,7 @@ class PathEditor extends EventTarget {
    *  Returns what is lost by that, for people, or "". */
   load(path) {
     const { pieces, broken, gap_m, kink_rad } = build(path, this.here(), { lead_m: this.lead_m });
-    const entries = pieces.slice(0, MOST_PIECES).map(asEntry);
+    const entries = pieces.slice(0, MOST_PIECES).map((piece) => made(asEntry(piece)));
     const { description = "", start = null } = path;
     this.chosen = null;
     this.edit((state) => Object.assign(state, { description, start: start && fullStart(start), entries }));
@@ -176,7 +179,8 @@ class PathEditor extends EventTarget {
   insert(kind) {
     const at = this.chosen === null ? this.entries.length : this.chosen + 1;
     const backward = this.entries[at - 1]?.backward ?? this.nextBackward;
-    this.edit((state) => state.entries.splice(at, 0, { ...(kind === "arc" ? NEW_ARC : NEW_LINE), backward }));
+    const entry = made({ ...(kind === "arc" ? NEW_ARC : NEW_LINE), backward });
+    this.edit((state) => state.entries.splice(at, 0, entry));
     this.set("chosen", at);
   }
 
@@ -199,7 +203,7 @@ class PathEditor extends EventTarget {
 
   /** Put an entry at the end. */
   append(entry) {
-    this.edit((state) => state.entries.push(entry));
+    this.edit((state) => state.entries.push(made(entry)));
     this.set("chosen", this.entries.length - 1);
   }
 
@@ -260,6 +264,11 @@ function referencePoint(status, backward) {
   const vehicle = status?.vehicle;
   const pose = (backward && vehicle?.trailer) || vehicle?.pose || vehicle?.odometry;
   return { x_m: pose?.x_m ?? 0, y_m: pose?.y_m ?? 0, heading_deg: pose?.yaw_deg ?? 0 };
+}
+
+function made(entry) {
+  entriesMade += 1;
+  return { ...entry, id: entriesMade };
 }
 
 function fullStart({ x_m = 0, y_m = 0, heading_deg = 0 }) {

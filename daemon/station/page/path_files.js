@@ -1,6 +1,7 @@
 /** Paths that are kept: load, save, delete, import, export, and recording the way that is driven. */
 
 import { allow, h, text } from "./dom.js";
+import { settleWriting } from "./fields.js";
 import { Question } from "./question.js";
 
 const NAME = "[A-Za-z0-9][A-Za-z0-9_\\-]{0,59}";
@@ -9,8 +10,8 @@ const NAME = "[A-Za-z0-9][A-Za-z0-9_\\-]{0,59}";
 export class PathFiles {
   #recording = false;
 
-  constructor(station, editor) {
-    [this.station, this.editor] = [station, editor];
+  constructor(station, editor, check) {
+    [this.station, this.editor, this.check] = [station, editor, check];
     this.select = h("select", { id: "path-kept", onchange: () => this.show() });
     this.name = h("input", { type: "text", pattern: NAME, maxlength: 60, oninput: () => this.show() });
     this.file = h("input", { type: "file", accept: ".json", hidden: true, onchange: () => this.#import() });
@@ -52,7 +53,7 @@ export class PathFiles {
   show() {
     const { station, buttons, select, editor, name } = this;
     const chosen = select.value ? null : "no path is kept yet";
-    const empty = editor.entries.length ? null : "there is no path yet";
+    const empty = this.#unwritable();
     const named = name.value && name.checkValidity() ? null : "give it a name: letters, digits, - and _";
     allow(buttons.load, chosen ?? station.cannot("station.path.read"));
     allow(buttons.remove, chosen ?? station.cannot("station.path.delete"));
@@ -60,6 +61,11 @@ export class PathFiles {
     allow(buttons.exporting, empty);
     allow(buttons.record, station.cannot("station.record.start"));
     text(buttons.record, this.#recording ? "End the recording" : "Record a drive");
+  }
+
+  /** Why what is on the screen cannot be written into a file; null where it can. */
+  #unwritable() {
+    return this.editor.entries.length ? this.check.wrong() : "there is no path yet";
   }
 
   // --- kept paths -----------------------------------------------------------------------------------------------
@@ -105,6 +111,8 @@ export class PathFiles {
   }
 
   #save() {
+    settleWriting();
+    if (this.#unwritable()) return;
     const name = this.name.value;
     const exists = [...this.select.options].some(({ value }) => value === name);
     if (exists) this.question.ask(`Replace the path ${name}?`, "Replace", () => this.#write(name, true));
@@ -112,6 +120,7 @@ export class PathFiles {
   }
 
   async #write(name, replace) {
+    if (this.#unwritable()) return;
     const params = { name, path: this.editor.spec(), replace };
     if (!(await this.station.attempt(this.station.call("station.path.write", params), `Path ${name}`))) return;
     text(this.told, `${name} is saved.`);
@@ -146,6 +155,8 @@ export class PathFiles {
 
   /** JSON is YAML, too: `canhelm drive path` reads it. */
   #export() {
+    settleWriting();
+    if (this.#unwritable()) return;
     const content = `${JSON.stringify(this.editor.spec(), null, 1)}\n`;
     const href = URL.createObjectURL(new Blob([content], { type: "application/json" }));
     h("a", { href, download: `${this.name.value || "path"}.json` }).click();

@@ -1,14 +1,23 @@
 /** The table of a path's pieces: every number of it, for the keyboard. */
 
-import { attribute, h } from "./dom.js";
+import { attribute, h, text } from "./dom.js";
 import { choice, field, put } from "./fields.js";
 import { Rows, table } from "./rows.js";
 
 const HEADS = ["No.", "Shape", "Length [m]", "Radius [m]", "Turn left [°]", "Drive", "Remove"];
 const LENGTH = { min: 0.01, max: 10000, required: true };
 const TURN = { min: -3600, max: 3600, required: true };
+const NO_TURN = "an arc turns: give degrees, or choose a line";
 const SHAPES = { line: "line", arc: "arc" };
 const DRIVES = { forward: "forward", backward: "backward" };
+const LABELS = {
+  kind: (piece) => `Shape of ${piece}`,
+  length_m: (piece) => `Length of ${piece} in metres`,
+  radius_m: (piece) => `Radius of ${piece} in metres`,
+  arc_deg: (piece) => `Turn of ${piece} in degrees, left positive`,
+  drive: (piece) => `Driving direction of ${piece}`,
+  remove: (piece) => `Remove ${piece}`,
+};
 
 /** What a line becomes as an arc, and an arc as a line. */
 const AS = {
@@ -28,7 +37,7 @@ export class PathTable {
     this.editor = editor;
     const { table: element, body } = table("Pieces of the path", HEADS);
     this.element = h("div", { class: "scroll path-pieces" }, element);
-    this.#rows = new Rows(body, ({ index }) => this.#make(index), ({ index }) => index);
+    this.#rows = new Rows(body, ({ entry }) => this.#make(entry.id), ({ entry }) => entry.id);
   }
 
   show() {
@@ -36,42 +45,44 @@ export class PathTable {
     this.#rows.show(this.editor.entries.map((entry, index) => ({ index, entry })));
   }
 
-  #make(index) {
-    const change = (numbers) => this.editor.change(index, numbers);
-    const of = `of piece ${index}`;
+  /** The row of an entry, whatever the number of its piece becomes. */
+  #make(id) {
+    const index = () => this.editor.entries.findIndex((entry) => entry.id === id);
+    const change = (numbers) => index() >= 0 && this.editor.change(index(), numbers);
     const cells = {
-      kind: choice(`Shape ${of}`, SHAPES, (kind) => this.#reshape(index, kind)),
-      length_m: field(`Length ${of} in metres`, LENGTH, (length_m) => change({ length_m })),
-      radius_m: field(`Radius ${of} in metres`, LENGTH, (radius_m) => change({ radius_m })),
-      arc_deg: field(`Turn ${of} in degrees, left positive`, TURN, (arc_deg) => arc_deg && change({ arc_deg })),
-      drive: choice(`Driving direction ${of}`, DRIVES, (drive) => change({ backward: drive === "backward" })),
+      kind: choice("", SHAPES, (kind) => this.#reshape(index(), kind)),
+      length_m: field("", LENGTH, (length_m) => change({ length_m })),
+      radius_m: field("", LENGTH, (radius_m) => change({ radius_m })),
+      arc_deg: field("", TURN, (arc_deg) => change({ arc_deg }), (arc_deg) => (arc_deg ? "" : NO_TURN)),
+      drive: choice("", DRIVES, (drive) => change({ backward: drive === "backward" })),
+      remove: h("button", { type: "button", onclick: () => this.#remove(index()) }, "✕"),
     };
-    const act = { type: "button", "aria-label": `Remove piece ${index}`, onclick: () => this.#remove(index) };
-    const remove = h("button", act, "✕");
-    const head = h("th", { scope: "row" }, String(index));
-    const columns = [...Object.values(cells), remove].map((cell) => h("td", {}, cell));
-    const element = h("tr", { onfocusin: () => this.editor.set("chosen", index) }, head, ...columns);
-    return { element, show: ({ entry }) => this.#show(element, cells, index, entry) };
+    const head = h("th", { scope: "row" });
+    const columns = Object.values(cells).map((cell) => h("td", {}, cell));
+    const element = h("tr", { onfocusin: () => this.editor.set("chosen", index()) }, head, ...columns);
+    return { element, show: ({ index: number, entry }) => this.#show(element, head, cells, number, entry) };
   }
 
-  #show(element, cells, index, entry) {
+  #show(element, head, cells, index, entry) {
     const { kind, length_m, radius_m, arc_deg, backward } = entry;
+    text(head, index);
+    for (const [name, cell] of Object.entries(cells)) attribute(cell, "aria-label", LABELS[name](`piece ${index}`));
     const isArc = kind === "arc";
     attribute(element, "data-chosen", this.editor.chosen === index);
     attribute(element, "data-wrong", this.editor.problem?.piece === index);
+    [cells.length_m.disabled, cells.radius_m.disabled, cells.arc_deg.disabled] = [isArc, !isArc, !isArc];
     put(cells.kind, kind);
     put(cells.drive, backward ? "backward" : "forward");
     put(cells.length_m, isArc ? arcLength(radius_m, arc_deg) : length_m);
     put(cells.radius_m, isArc ? radius_m : "");
     put(cells.arc_deg, isArc ? arc_deg : "");
-    [cells.length_m.disabled, cells.radius_m.disabled, cells.arc_deg.disabled] = [isArc, !isArc, !isArc];
   }
 
   #reshape(index, kind) {
-    const { backward, ...before } = this.editor.entries[index];
+    const { id, backward, ...before } = this.editor.entries[index];
     if (kind === before.kind) return;
     this.editor.edit((state) => {
-      state.entries[index] = { kind, ...AS[kind](before), backward };
+      state.entries[index] = { kind, ...AS[kind](before), backward, id };
     });
   }
 

@@ -2,6 +2,7 @@
 
 import { ErrorCharts, SpeedChart } from "./charts.js";
 import { h, redraw } from "./dom.js";
+import { putBack, wrongIn } from "./fields.js";
 import { Following } from "./following.js";
 import { PathCheck } from "./path_check.js";
 import { editorOf, SNAP_DEG, SNAP_M } from "./path_editor.js";
@@ -26,9 +27,9 @@ class PathsPanel {
     this.station = station;
     this.editor = editorOf(station);
     this.following = new Following(station, this.editor, () => this.check);
-    this.check = new PathCheck(station, this.editor, () => this.following.speed_m_s());
+    this.check = new PathCheck(station, this.editor, this.#boxes());
     this.verdict = new VerdictText(this.check, (length_m) => this.following.lasts(length_m));
-    this.files = new PathFiles(station, this.editor);
+    this.files = new PathFiles(station, this.editor, this.check);
     this.table = new PathTable(this.editor);
     this.start = new StartFields(this.editor);
     this.errors = new ErrorCharts(station);
@@ -36,6 +37,11 @@ class PathsPanel {
     this.#make();
     this.#listen();
     this.#show();
+  }
+
+  /** What the check asks the boxes of this panel. */
+  #boxes() {
+    return { speed_m_s: () => this.following.speed_m_s, wrong: () => wrongIn(this.element) };
   }
 
   #make() {
@@ -81,6 +87,8 @@ class PathsPanel {
     const show = redraw(this.element, () => this.#show());
     this.editor.addEventListener("change", show);
     this.check.addEventListener("change", show);
+    this.element.addEventListener("judged", () => this.check.look());
+    this.editor.addEventListener("undo", (event) => putBack(this.element) && event.preventDefault());
     for (const kind of ["status", "connected", "shape", "stale"]) station.on(kind, show);
     station.on("robot", () => this.following.forget());
     document.addEventListener("keydown", (event) => this.#onKey(event));
@@ -102,9 +110,11 @@ class PathsPanel {
     const lacks = Boolean(station.shape && !station.shape.path);
     this.lacking.hidden = !lacks;
     this.body.hidden = lacks;
-    [this.undo.disabled, this.redo.disabled] = [!editor.undoable, !editor.redoable];
+    [this.undo.disabled, this.redo.disabled] = [!editor.undoable && !this.check.wrong(), !editor.redoable];
     this.clear.disabled = !editor.entries.length;
     this.snap.checked = editor.snaps;
-    for (const part of [this.verdict, this.following, this.table, this.start, this.files]) part.show();
+    for (const part of [this.table, this.start]) part.show();
+    this.check.look();
+    for (const part of [this.verdict, this.following, this.files]) part.show();
   }
 }
