@@ -64,7 +64,7 @@ class Drawer:
         self.page.keyboard.press("Tab")
 
     def sees_blocked(self, label: str, words: str) -> None:
-        """Wait until the panel tells what is wrong with a box, at the box and in the verdict, and lets nothing be done."""
+        """Wait until what is wrong with a box stands beside it and in the verdict, and nothing can be done."""
         self.operator.sees(f"{PANEL} .path-verdict", f"^✖ Cannot be driven: {label}[^:]*: {words}")
         note = self.box(label).get_attribute("aria-describedby")
         self.operator.sees(f"#{note}", f"^{words}")
