@@ -7,6 +7,7 @@ import itertools
 import logging
 import os
 from collections.abc import Callable, Coroutine
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from canhelm import __version__, errors, protocol
@@ -33,6 +34,8 @@ MAX_UNSENT_BYTES = 1024 * 1024
 """Unsent bytes at which a client is dropped."""
 STALLED_S = 10.0
 """Time of lost samples on end after which a client is dropped."""
+MAX_NAME_LENGTH = 60
+"""Characters of what a client calls itself."""
 FAREWELL_S = 0.2
 """How long a client whose line was too long may still send, unheard: it reads its answer when it has sent all."""
 
@@ -74,6 +77,7 @@ class Connection(asyncio.Protocol):
         self._sampling: asyncio.TimerHandle | None = None
         self._own: dict[str, Callable[[dict[str, Any]], Coroutine[Any, Any, dict[str, Any]]]] = {
             "hello": self._hello,
+            "client.name": self._take_name,
             "api.schema": self._schema,
             "status": self._status,
             "subscribe": self._subscribe,
@@ -331,8 +335,17 @@ class Connection(asyncio.Protocol):
             "state": str(backend.state),
             "lease_timeout_s": backend.lease_timeout_s,
             "role": self._peer.role,
+            "name": self._peer.label,
             "pid": os.getpid(),
         }
+
+    async def _take_name(self, params: dict[str, Any]) -> dict[str, Any]:
+        name = params["name"].strip()
+        if not 0 < len(name) <= MAX_NAME_LENGTH or not name.isprintable():
+            remedy = f"give 1 to {MAX_NAME_LENGTH} printable characters"
+            raise UsageError("client.name: this is no name for a client", object="name", remedy=remedy)
+        self._peer = replace(self._peer, label=name)
+        return {"name": name}
 
     async def _schema(self, params: dict[str, Any]) -> dict[str, Any]:
         return {

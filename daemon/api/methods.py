@@ -35,7 +35,14 @@ def _angle(name: str, doc: str, **more: Any) -> Param:
 
 
 _TALK = (
-    Method("hello", "Who answers.", (), "api_version, version, robot, state, lease_timeout_s, role", Role.STOP),
+    Method("hello", "Who answers.", (), "api_version, version, robot, state, lease_timeout_s, role, name", Role.STOP),
+    Method(
+        "client.name",
+        "What people call this client; told beside its user and program (name of hello and of a holder).",
+        (Param("name", "string", "1 to 60 characters"),),
+        "name",
+        Role.WATCH,
+    ),
     Method("api.schema", "Every method, event and error.", (), "methods, notifications, errors", Role.WATCH),
     Method(
         "status",
@@ -66,7 +73,7 @@ _WHOLE = (
     Method(
         "stop",
         "Stop everything now; answers at rest. Needs no lease.",
-        (),
+        (Param("reason", "string", "how it was, and by whom, for people", default="commanded"),),
         "state, enabled, message",
         Role.STOP,
         urgent=True,

@@ -60,6 +60,7 @@ class Peer:
         groups: its groups.
         role: the most it may do.
         name: of one that came over the network, for people.
+        label: what it calls itself, for people; empty where it does not.
     """
 
     pid: int
@@ -67,6 +68,7 @@ class Peer:
     groups: frozenset[int]
     role: Role
     name: str = ""
+    label: str = ""
 
     @classmethod
     def nobody(cls) -> Peer:
@@ -80,11 +82,14 @@ class Peer:
 
     def details(self) -> dict[str, Any]:
         """User, process id and command, for status."""
-        return {"user": self.user} if self.name else {"user": self.user, "pid": self.pid, "command": self._command}
+        label = {"name": self.label} if self.label else {}
+        process = {} if self.name else {"pid": self.pid, "command": self._command}
+        return {**label, "user": self.user, **process}
 
     def told(self) -> str:
         """The same for messages."""
-        return self.name or f"{self.user} (pid {self.pid}: {self._command})"
+        told = self.name or f"{self.user} (pid {self.pid}: {self._command})"
+        return f"{self.label} by {told}" if self.label else told
 
     @property
     def _command(self) -> str:

@@ -27,6 +27,8 @@ from drivers.contract import DriveState
 from drivers.simulated.computer_trouble import ComputerTrouble
 from drivers.simulated.faults import Faults
 
+REASON_LENGTH = 200
+"""Characters of the reason for a stop that are kept."""
 OF_A_SETUP = ("motor.enable", "motor.reset", "brake.release")
 """Methods without a motion that, while a setup is under way, are for its client alone."""
 
@@ -120,7 +122,11 @@ class Commands:
     # --- the whole vehicle -------------------------------------------------------------------------------------
 
     async def _stop(self, params: Params, lease: str | None) -> dict[str, Any]:
-        await self._supervisor.stop("stop was commanded")
+        told = f"stop was {str(params.get('reason') or 'commanded')[:REASON_LENGTH]}"
+        log, moving = self._supervisor.log, bool(self._supervisor.motions)
+        if moving and not log.told(told):
+            log.add("info", "supervisor", told)
+        await self._supervisor.stop(told)
         return {"state": self._supervisor.state.value, **self._still_enabled()}
 
     def _still_enabled(self) -> Params:

@@ -14,7 +14,7 @@ from typing import Any, Final
 from aiohttp import WSMessage, WSMsgType, web
 
 from canhelm import protocol
-from canhelm.errors import CanhelmError, DaemonNotRunning, Refused, UsageError
+from canhelm.errors import CanhelmError, DaemonNotRunning, PermissionRefused, Refused, UsageError
 from daemon.api.parameters import Method, Role, validate
 from daemon.station.lateness import Lateness
 from daemon.station.limits import lowered, refusal
@@ -40,6 +40,7 @@ UNSENT_BYTES: Final = 16 * 1024
 """What the kernel holds for a page beyond what is on its way: samples that wait there would only get older."""
 _REASON_BYTES: Final = 123
 """Of the reason with which a WebSocket closes (RFC 6455, 5.5)."""
+NAMES: Final = "client.name"
 SENT: Final = "sent_ms"
 """Member of a request: when it was sent, by the page's clock; the daemon does not see it."""
 _FAREWELL: Final = b'{"jsonrpc":"2.0","id":null,"error"'
@@ -56,6 +57,7 @@ class Link:
         transport: of the page.
         robot: the robot.
         limit: the most that the page may do.
+        name: what people call the page.
     """
 
     def __init__(
@@ -64,7 +66,9 @@ class Link:
         transport: asyncio.Transport,
         robot: Robot,
         limit: Role,
+        name: str,
     ) -> None:
+        self._name = name
         self._page = page
         self._transport = transport
         self._robot = robot
@@ -87,6 +91,7 @@ class Link:
         reader, writer = await asyncio.open_connection(sock=connection, limit=protocol.MAX_ANSWER_BYTES)
         asking, hearing = asyncio.create_task(self._ask(writer)), asyncio.create_task(self._hear(reader))
         telling = asyncio.create_task(self._tell())
+        writer.write(protocol.make_notification(NAMES, {"name": self._name}))  # nobody answers that
         try:
             done, _ = await asyncio.wait([asking, hearing, telling], return_when=asyncio.FIRST_COMPLETED)
         finally:
@@ -139,6 +144,8 @@ class Link:
         request_id, name = request.get("id"), request["method"]
         self._lateness.look(request.pop(SENT, None), asyncio.get_running_loop().time())
         refused = refusal(name, self._limit) or self._lateness.refusal(name)
+        if name == NAMES:
+            refused = PermissionRefused("the station names its pages", remedy="leave client.name out")
         if refused is not None:
             self._answer(request_id, refused)
         elif name.startswith(PREFIX):

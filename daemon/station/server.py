@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+import re
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any, Final
@@ -34,6 +35,7 @@ FAREWELL_S: Final = 1.0
 CONNECT_S: Final = 2.0
 """How long a daemon may take to accept a connection."""
 _STATUS_CODES: Final = {UsageError: 404, DaemonNotRunning: 404, PermissionRefused: 403, Refused: 409, ConfigError: 409}
+_PAGE_NUMBER: Final = re.compile("[1-9][0-9]{2}")
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
@@ -196,8 +198,9 @@ class Station:
         if transport is None:
             connection.close()
             return
-        LOGGER.info("a page at %s is connected to %s with the role %s", request.remote, robot.name, role)
-        await Link(page, transport, robot, role).run(connection)
+        name = _page_name(request)
+        LOGGER.info("%s is connected to %s with the role %s", name, robot.name, role)
+        await Link(page, transport, robot, role, name).run(connection)
 
     # -- runs ---------------------------------------------------------------------------------------------------------
 
@@ -230,6 +233,13 @@ def _defects() -> logging.Logger:
 
 def _is_ours(record: logging.LogRecord) -> bool:
     return not isinstance(record.exc_info[1] if record.exc_info else None, HttpProcessingError | ConnectionError)
+
+
+def _page_name(request: web.Request) -> str:
+    """What people call a page: by the number that it has drawn, which outlives its connections, and its address."""
+    number = request.query.get("page", "")
+    which = f"page {number}" if _PAGE_NUMBER.fullmatch(number) else "a page"
+    return f"{which} at {request.remote or 'an unknown address'}"
 
 
 def _reason(error: OSError | OverflowError) -> str:

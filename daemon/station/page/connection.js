@@ -7,6 +7,9 @@ const SILENCE_MS = 4000;
 const STATUS_RATE_HZ = 20;
 const NO_STATION = "no connection to the control station";
 
+/** By which people tell this page from others: of three digits, as long as it is open. */
+const PAGE_NUMBER = 100 + Math.floor(900 * Math.random());
+
 /** What the daemon or the station answered instead of a result, or why there was no answer. */
 export class RpcError extends Error {
   /**
@@ -54,7 +57,7 @@ export class Connection extends EventTarget {
 
   /** Connect, and connect again whenever the connection is lost, until `close`. */
   open() {
-    const address = new URL(`ws/${encodeURIComponent(this.robot)}`, document.baseURI);
+    const address = new URL(`ws/${encodeURIComponent(this.robot)}?page=${PAGE_NUMBER}`, document.baseURI);
     address.protocol = address.protocol.replace("http", "ws");
     const socket = new WebSocket(address);
     this.#socket = socket;

@@ -125,7 +125,7 @@ export class GamepadDriver {
     for (const [button, method] of [[stop, "stop"], [emergency_stop, "estop"]]) {
       const down = this.#isDown(button);
       if (down && !this.#pressed.has(button)) {
-        this.#stopper.send(method, method === "estop" ? { reason: "pressed on a gamepad" } : {});
+        this.#stopper.send(method, "pressed by gamepad");
         this.drop();
       }
       if (down) this.#pressed.add(button);

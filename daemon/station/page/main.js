@@ -12,6 +12,7 @@ import * as objects from "./objects.js";
 import * as paths from "./paths.js";
 import * as runs from "./runs.js";
 import * as simulation from "./simulation.js";
+import { watchOthers } from "./others.js";
 import { station } from "./station.js";
 
 const PANELS = {
@@ -59,6 +60,7 @@ function choose() {
 
 showNotices(station);
 watchHeader(station);
+watchOthers(station);
 build();
 choose();
 addEventListener("hashchange", () => {

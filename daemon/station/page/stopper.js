@@ -21,7 +21,7 @@ export class Stopper {
   /** Stop by these buttons, and by the space bar wherever the focus is. */
   watch(stop, estop) {
     pressed(stop, () => this.send("stop"));
-    pressed(estop, () => this.send("estop", { reason: `pressed on ${this.#page}` }));
+    pressed(estop, () => this.send("estop"));
     document.addEventListener("keydown", (event) => this.#onKey(event), { capture: true });
     document.addEventListener("keyup", swallowSpace, { capture: true });
   }
@@ -30,16 +30,16 @@ export class Stopper {
    * Send a stop now, and tell what has become of it.
    *
    * @param {"stop"|"estop"} method which one
-   * @param {object} params its parameters
+   * @param {string} way how it was pressed, for people
    */
-  async send(method, params = {}) {
+  async send(method, way = "pressed") {
     const station = this.#station;
     const what = method === "stop" ? "stop" : "emergency stop";
     if (!station.sends) {
       station.stopAlarm.raise(`${what} NOT SENT`, "no connection to the robot!", "stop it at the robot itself");
       return;
     }
-    const answer = station.call(method, params, { timeout_ms: 15_000 });
+    const answer = station.call(method, { reason: `${way} on ${this.#page}` }, { timeout_ms: 15_000 });
     const late = setTimeout(() => this.#tellLate(what), ANSWER_MS);
     try {
       const told = await answer;
@@ -75,7 +75,7 @@ export class Stopper {
     } else if (isStop(event)) {
       event.preventDefault();
       event.stopPropagation();
-      if (!event.repeat) this.send("stop");
+      if (!event.repeat) this.send("stop", "pressed by the space bar");
     }
   }
 }

@@ -23,12 +23,21 @@ from vcan_tests.daemon.station.visitor import Page, Visit, Visitor
 pytestmark = pytest.mark.real_time
 
 MOVE: dict[str, Any] = {"node": 1, "velocity_rpm": 10}
+NAMED = 1
+"""Requests with which the station tells the daemon what people call a page."""
 
 
 async def test_a_request_gets_the_answer_of_the_daemon(visitor: Visitor) -> None:
     page = await visitor.open()
     answer = await page.ask("hello")
     assert (answer["result"]["robot"], answer["result"]["role"]) == ("fake", "configure")
+
+
+async def test_a_page_has_the_name_that_the_station_gives_it(visitor: Visitor) -> None:
+    page = await visitor.open()
+    refused = await page.ask("client.name", name="somebody else")
+    assert refused["error"]["message"] == "the station names its pages"
+    assert (await page.ask("hello"))["result"]["name"] == "a page at 127.0.0.1"
 
 
 async def test_an_error_of_the_daemon_comes_as_it_is(visitor: Visitor) -> None:
@@ -116,7 +125,7 @@ async def test_a_request_above_the_role_of_the_page_does_not_reach_the_daemon(
     error = (await page.ask(method))["error"]
     assert error["data"]["type"] == "PermissionRefused"
     assert "log in with a token for" in error["data"]["remedy"]
-    assert (backend.calls, daemon.counters.requests) == ([], 0)
+    assert (backend.calls, daemon.counters.requests) == ([], NAMED)
 
 
 async def test_two_requests_in_one_message_are_not_two_lines(
@@ -127,7 +136,7 @@ async def test_two_requests_in_one_message_are_not_two_lines(
     await page.socket.send_str(f'{{"jsonrpc":"2.0","id":1,"method":"status","x":\n{hidden}\n}}')
     await page.hear(lambda message: message.get("id") == 1)
     await page.ask("status")
-    assert (backend.calls, daemon.counters.requests, daemon.counters.malformed) == ([], 2, 0)
+    assert (backend.calls, daemon.counters.requests, daemon.counters.malformed) == ([], NAMED + 2, 0)
 
 
 async def test_who_watches_may_stop(guest: Visitor) -> None:
@@ -150,7 +159,7 @@ async def test_a_page_is_told_its_own_role_and_the_way_to_the_next(guest: Visito
 async def test_the_station_answers_its_own_methods(visitor: Visitor, daemon: Server) -> None:
     page = await visitor.open()
     assert (await page.ask("station.paths"))["result"] == {"paths": []}
-    assert daemon.counters.requests == 0
+    assert daemon.counters.requests == NAMED
 
 
 @pytest.mark.parametrize(
