@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import hmac
 import os
+import re
 import stat
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,6 +16,8 @@ from daemon.api.parameters import Role
 
 SHORTEST: Final = 32
 """Characters of a token: too many to guess."""
+_WORD: Final = re.compile("[a-z]{1,12}")
+"""What is shown of a line: a word of this form is a role that was written wrongly, and no part of a token."""
 _ROLES: Final = {role.value: role for role in (Role.WATCH, Role.DRIVE, Role.CONFIGURE)}
 
 
@@ -49,31 +52,42 @@ def load_tokens(path: Path) -> Tokens:
             lines = file.read(1 << 16).splitlines()
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is no text"
-        raise ConfigError(
-            f"the tokens in {path} cannot be read: {reason}", remedy="name a file of the daemon's user with --tokens"
-        ) from None
-    roles = dict(_token(f"{path}:{number}", line) for number, line in enumerate(lines, 1) if line.strip())
+        raise ConfigError(f"the tokens in {path} cannot be read: {reason}", remedy=_cure(path, error)) from None
+    roles: dict[str, Role] = {}
+    for number, line in enumerate(lines, 1):
+        if line.strip():
+            _add(roles, f"{path}:{number}", line)
     if not roles:
         raise ConfigError(f"{path} has no token", remedy="write lines as: drive $(openssl rand -hex 32)")
     return Tokens(roles)
 
 
+def _cure(path: Path, error: OSError | UnicodeDecodeError) -> str:
+    if isinstance(error, FileNotFoundError):
+        return f'(umask 077; echo "drive $(openssl rand -hex 32)" > {path})'
+    if isinstance(error, PermissionError):
+        return f"sudo chown {os.getuid()} {path}, and let this user into its folder"
+    return "name a file of lines, each a role and a token, with --tokens"
+
+
 def _require_private(path: Path, found: os.stat_result) -> None:
     if found.st_uid not in (0, os.getuid()):
-        raise ConfigError(f"{path} belongs to somebody else", remedy=f"sudo chown $USER {path}")
+        raise ConfigError(f"{path} belongs to somebody else", remedy=f"sudo chown {os.getuid()} {path}")
     if stat.S_IMODE(found.st_mode) & 0o077:
         raise ConfigError(f"others than its owner may use {path}", remedy=f"chmod 600 {path}, and make new tokens")
 
 
-def _token(place: str, line: str) -> tuple[str, Role]:
-    role, _, token = line.strip().partition(" ")
-    if role not in _ROLES:
-        raise ConfigError(f"{place}: {role[:20]!r} is no role", remedy=f"begin the line with {', '.join(_ROLES)}")
+def _add(roles: dict[str, Role], place: str, line: str) -> None:
+    word, _, token = line.strip().partition(" ")
+    if word not in _ROLES:
+        told = f"{word!r} is no role" if _WORD.fullmatch(word) else "no role stands first"
+        raise ConfigError(f"{place}: {told}", remedy=f"begin the line with {', '.join(_ROLES)}, a space and the token")
     if len(token) < SHORTEST or not token.isprintable() or " " in token:
         raise ConfigError(
             f"{place}: the token is shorter than {SHORTEST} characters, or has spaces", remedy="openssl rand -hex 32"
         )
-    return token, _ROLES[role]
+    if roles.setdefault(token, _ROLES[word]) != _ROLES[word]:
+        raise ConfigError(f"{place}: a line above gives this token another role", remedy="make a token for each role")
 
 
 def _digest(token: str) -> bytes:

@@ -46,6 +46,10 @@ def station(
     from daemon.station.robots import Robots
     from daemon.station.server import Station
 
+    if not host:
+        raise UsageError(
+            "--host names no address", value=host, remedy="give an address of this machine, or leave it out"
+        )
     if tokens is None and not is_loopback(host):
         remedy = "give a file of tokens with --tokens, or leave --host out"
         raise UsageError(f"whoever reaches {host} could drive the robots without a token", value=host, remedy=remedy)

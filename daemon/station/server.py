@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import logging
 import os
 import re
+import socket
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any, Final
@@ -72,10 +74,8 @@ class Station:
             await web.TCPSite(self._runner, self.host, self.port).start()
         except (OSError, OverflowError) as error:
             await self._runner.cleanup()
-            raise ConfigError(
-                f"the control station cannot listen on {self.host} port {self.port}: {_reason(error)}",
-                remedy="choose another port with --port, or end what listens there",
-            ) from None
+            message = f"the control station cannot listen on {self.host} port {self.port}: {_reason(error)}"
+            raise ConfigError(message, remedy=_cure(error)) from None
         self.port = self._runner.addresses[0][1]
 
     async def close(self) -> None:
@@ -246,6 +246,15 @@ def _reason(error: OSError | OverflowError) -> str:
     """Without the address, which asyncio puts into the text of its errors."""
     number = getattr(error, "errno", None) or 0
     return os.strerror(number) if number > 0 else getattr(error, "strerror", None) or str(error)
+
+
+def _cure(error: OSError | OverflowError) -> str:
+    number = getattr(error, "errno", None)
+    if isinstance(error, socket.gaierror) or number == errno.EADDRNOTAVAIL:
+        return "give --host an address of this machine (`ip address` lists them), or leave it out"
+    if number == errno.EACCES:
+        return "choose a port from 1024 on with --port"
+    return "choose another port with --port, or end what listens there"
 
 
 def _told(error: CanhelmError, status: int) -> web.Response:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import secrets
 from pathlib import Path
 
 import pytest
@@ -57,6 +59,8 @@ def test_a_file_of_somebody_else_is_refused(tmp_path: Path, monkeypatch: pytest.
         ("watch short\n", f":1: the token is shorter than {SHORTEST} characters"),
         (f"watch {WATCHES} more\n", ":1: the token is shorter"),
         ("watch\n", ":1: the token is shorter"),
+        (f"watch {WATCHES}\ndrive {WATCHES}\n", ":2: a line above gives this token another role"),
+        (f"Drive {DRIVES}\n", ":1: no role stands first"),
     ],
 )
 def test_a_line_that_is_no_token_is_told_with_its_place(tmp_path: Path, text: str, told: str) -> None:
@@ -65,9 +69,30 @@ def test_a_line_that_is_no_token_is_told_with_its_place(tmp_path: Path, text: st
     assert WATCHES not in str(caught.value)
 
 
+@pytest.mark.parametrize("token", [secrets.token_hex(32), secrets.token_urlsafe(32), "A" * SHORTEST, "d" * SHORTEST])
+@pytest.mark.parametrize("form", ["{}", "{} drive", "drive{}", "{}\tdrive", "drive\t{}", "boss {}", "drive {} {}"])
+def test_no_part_of_a_token_is_told(tmp_path: Path, form: str, token: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        load_tokens(written(tmp_path / "tokens", form.format(token, token)))
+    told = str(caught.value).replace(str(tmp_path), "")
+    assert not any(token[at : at + 6] in told for at in range(len(token) - 5))
+
+
+def test_a_file_that_may_not_be_read_is_told_with_who_wants_to(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(path: Path, **options: object) -> None:
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    monkeypatch.setattr(Path, "open", refuse)
+    with pytest.raises(ConfigError, match="Permission denied") as caught:
+        load_tokens(tmp_path / "tokens")
+    assert caught.value.remedy.startswith(f"sudo chown {os.getuid()} {tmp_path}")
+
+
 def test_a_file_that_is_missing_or_no_text_is_told(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="No such file"):
         load_tokens(tmp_path / "none")
+    with pytest.raises(ConfigError, match="Is a directory"):
+        load_tokens(tmp_path)
     binary = tmp_path / "binary"
     binary.touch(0o600)
     binary.write_bytes(b"\xff\xfe")

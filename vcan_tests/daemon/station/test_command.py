@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from daemon.api.tokens import SHORTEST
 from vcan_tests.daemon.cli.shell import run
 from vcan_tests.daemon.cli.test_what_is_loaded import loaded_by
 
@@ -44,6 +45,20 @@ def test_a_port_that_is_taken_is_told(taken: int, capsys: pytest.CaptureFixture[
     assert f"cannot listen on 127.0.0.1 port {taken}: Address already in use - choose" in capsys.readouterr().err
 
 
+@pytest.mark.real_time
+@pytest.mark.parametrize("host", ["192.0.2.1", "none.invalid"])
+def test_an_address_that_this_machine_has_not_is_told(
+    host: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tokens = tmp_path / "tokens"
+    tokens.touch(mode=0o600)
+    tokens.write_text(f"watch {'w' * SHORTEST}")
+    assert run(f"station --host {host} --tokens {tokens}") == 7
+    told = capsys.readouterr().err
+    assert f"cannot listen on {host} port 8137" in told
+    assert "give --host an address of this machine" in told
+
+
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.0.2.1", "lab1"])
 def test_another_address_than_the_loopback_wants_tokens(host: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(f"station --host {host}") == 2
@@ -56,7 +71,13 @@ def test_a_file_of_tokens_that_is_missing_is_told(capsys: pytest.CaptureFixture[
 
 
 @pytest.mark.parametrize(
-    ("options", "told"), [("--port 65536", "no port"), ("--robot ../x", "not a robot's name"), ("--port x", "port")]
+    ("options", "told"),
+    [
+        ("--port 65536", "no port"),
+        ("--robot ../x", "not a robot's name"),
+        ("--port x", "port"),
+        ("--host=", "names no address"),
+    ],
 )
 def test_options_that_make_no_sense_are_refused(options: str, told: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(f"station {options}") == 2
