@@ -34,8 +34,20 @@ PHONE: dict[str, Any] = {
     "is_mobile": True,
 }
 PANELS = ("drive", "map", "devices", "events", "objects", "paths", "runs", "simulation")
-TIMEOUT_S = 15.0
+TIMEOUT_S = 30.0
+CONNECTED = "^connected$"
+"""What ``#connection`` says of a robot whose values come."""
 READY_TO_DRIVE = "() => document.querySelectorAll('.stick:not([aria-disabled]), #slider-speed:enabled').length === 2"
+CAUGHT_UP = """async pause_ms => {
+    const { station } = await import("/page/station.js");
+    const pause = () => new Promise(done => setTimeout(done, pause_ms));
+    await pause();
+    for (let frames = 0; frames < 2; frames++) await new Promise(requestAnimationFrame);
+    const answered = () => station.call("status").catch(() => pause().then(answered));
+    await answered();
+}"""
+PAUSE_MS = 300.0
+"""By the page's own clock: longer than it lets pass between two set-points, and between two looks at its values."""
 
 
 @contextmanager
@@ -123,7 +135,7 @@ class Operator:
         """Choose a robot; returns when the page shows its state."""
         self.page.wait_for_selector(f"#robot option[value='{robot}']", state="attached")
         self.page.select_option("#robot", robot)
-        self.sees("#connection", "connected")
+        self.sees("#connection", CONNECTED)
 
     def go_to(self, panel: str) -> None:
         """Open a panel by its tab; returns when it shows."""
@@ -153,6 +165,17 @@ class Operator:
         while not condition():
             assert time.monotonic() < deadline, told()
             self.page.wait_for_timeout(20.0)
+
+    def comes_to(self, look: Callable[[], object], wanted: object) -> None:
+        """Look at the page again and again until this is what is found."""
+        self.until(lambda: look() == wanted, lambda: f"found {look()!r}, not {wanted!r}")
+
+    def catches_up(self) -> None:
+        """Wait until the page has done what it does of what went before, and the daemon has answered all of it.
+
+        Whoever asserts that something has not happened waits for this first.
+        """
+        self.page.evaluate(CAUGHT_UP, PAUSE_MS)
 
     def pulls(self, selector: str, right: float, up: float) -> None:
         """Press on the middle of an element and pull, in parts of half its size; the button stays down."""

@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from vcan_tests.station.browser import Operator, chromium
-from vcan_tests.station.processes import Fleet, Robot, running_fleet
+from vcan_tests.station.processes import UNHELD_S, Fleet, Robot, running_fleet
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
-REST_S = 5.0
-"""Within which a robot stands that nobody drives any more."""
 Meet = Callable[..., Operator]
 
 
@@ -60,7 +58,7 @@ def meet(browser: Browser, fleet: Fleet, expected_errors: list[str]) -> Iterator
         operator.close()
     assert [problem for operator in operators for problem in operator.unexpected()] == []
     for name, robot in fleet.robots.items():
-        robot.comes_to_rest(REST_S)
+        robot.comes_to_rest(UNHELD_S)
         told = robot.errors_since(begins[name])
         assert [error for error in told if not any(part in error for part in expected_errors)] == []
         assert robot.status()["api"]["internal_errors"] == 0

@@ -23,6 +23,11 @@ from canhelm.errors import CanhelmError
 
 TIMEOUT_S = 60.0
 REST_M_S = 0.01
+LEASE_S = 1.5
+RAMP_S = 0.8
+"""From the speeds that are driven here by hand, by the ramp of a drive."""
+UNHELD_S = LEASE_S + RAMP_S
+"""Within which a robot stands that is not held any more, whatever has become of the page and the station."""
 COMMAND = (sys.executable, "-m", "daemon")
 ERROR = re.compile(r"^\S+ \S+ (?:ERROR|CRITICAL) (.*)$", re.MULTILINE)
 """A line of a daemon's log that tells of an event of severity error, or of a defect."""
@@ -151,6 +156,16 @@ class Robot(Child):
         """Watch until every wheel stands."""
         self.comes_to(at_rest, within_s)
 
+    def stays_at_rest(self, for_s: float = 0.5) -> None:
+        """Watch that every wheel stands, for some time by the robot's clock."""
+        begun_s = self.status()["time_s"]
+
+        def over(status: Status) -> bool:
+            assert at_rest(status), speeds(status)
+            return bool(status["time_s"] - begun_s > for_s)
+
+        self.comes_to(over)
+
     @contextmanager
     def watched(self) -> Iterator[SpeedWatch]:
         """A look at its speed all the time while the ``with`` block lasts."""
@@ -170,6 +185,8 @@ class Robot(Child):
         """As after its start, wherever a test has left it."""
         with Client(self.socket) as client:
             client.call("simulation.clear_faults")
+            client.call("simulation.pace", factor=1.0)
+            client.call("simulation.slope", slope_deg=0.0)
             client.call("stop")
             if client.call("status")["state"] in ("estop", "fault"):
                 client.call("reset")

@@ -7,14 +7,13 @@ from typing import Any
 
 import pytest
 
-from vcan_tests.station.browser import PHONE, Operator
+from vcan_tests.station.browser import CONNECTED, PHONE, Operator
 from vcan_tests.station.conftest import Meet
-from vcan_tests.station.processes import Fleet, Robot, at_rest, speeds
+from vcan_tests.station.processes import UNHELD_S, Fleet, Robot, speeds
 
 pytestmark = pytest.mark.station
 
 ROBOTS = ("max2d", "semitrailer")
-LEASE_S = 1.5
 FAKE_PAD = """(() => {
     const buttons = Array.from({length: 17}, () => ({pressed: false, touched: false, value: 0}));
     const pad = {id: "a pad of the test", index: 0, connected: true, mapping: "standard", timestamp: 0,
@@ -66,7 +65,7 @@ def test_the_stick_drives_and_the_robot_is_at_rest_within_the_lease_when_it_is_l
     assert driven["motions"][0]["kind"] == "drive.set"
     driver.sees("#commanded", "speed 0.[3-9]")
     driver.page.mouse.up()
-    robot.comes_to_rest(LEASE_S)
+    robot.comes_to_rest(UNHELD_S)
     driver.sees("#commanded", "nothing")
 
 
@@ -75,18 +74,19 @@ def test_the_stick_goes_aside_and_back(driver: Operator, robot: Robot) -> None:
     backward = robot.comes_to(moving(0.2))
     driver.page.mouse.up()
     assert all(node["speed_m_s"] < 0.0 for node in backward["nodes"] if node.get("speed_m_s") is not None)
-    robot.comes_to_rest(LEASE_S)
+    robot.comes_to_rest(UNHELD_S)
 
 
 def test_keys_drive_while_they_are_held_and_only_when_they_are_switched_on(driver: Operator, robot: Robot) -> None:
     driver.page.keyboard.down("w")
     driver.page.keyboard.up("w")
+    driver.catches_up()
     assert robot.status()["motions"] == []
     driver.page.get_by_role("button", name="Keyboard is off").click()
     driver.page.keyboard.down("w")
     robot.comes_to(moving(0.2))
     driver.page.keyboard.up("w")
-    robot.comes_to_rest(LEASE_S)
+    robot.comes_to_rest(UNHELD_S)
 
 
 def test_the_stick_is_held_by_arrow_keys_when_it_has_the_focus(driver: Operator, robot: Robot) -> None:
@@ -94,7 +94,7 @@ def test_the_stick_is_held_by_arrow_keys_when_it_has_the_focus(driver: Operator,
     driver.page.keyboard.down("ArrowUp")
     robot.comes_to(moving(0.2))
     driver.page.keyboard.up("ArrowUp")
-    robot.comes_to_rest(LEASE_S)
+    robot.comes_to_rest(UNHELD_S)
 
 
 def test_a_slider_drives_only_while_it_is_held(driver: Operator, robot: Robot) -> None:
@@ -105,18 +105,19 @@ def test_a_slider_drives_only_while_it_is_held(driver: Operator, robot: Robot) -
     driver.page.mouse.move(box["x"] + box["width"] * 0.75, box["y"] + box["height"] / 2, steps=3)
     robot.comes_to(moving(0.2))
     driver.page.mouse.up()
-    robot.comes_to_rest(LEASE_S)
-    assert driver.page.input_value("#slider-speed") == "0"
+    robot.comes_to_rest(UNHELD_S)
+    driver.comes_to(lambda: driver.page.input_value("#slider-speed"), "0")
 
 
 def test_a_page_that_is_hidden_lets_go_and_does_not_go_on_when_it_is_seen_again(driver: Operator, robot: Robot) -> None:
     driver.pulls(".stick", right=0.0, up=0.9)
     robot.comes_to(moving(0.2))
     driver.page.evaluate(HIDE, True)
-    robot.comes_to_rest(LEASE_S)
+    robot.comes_to_rest(UNHELD_S)
     driver.page.evaluate(HIDE, False)
-    driver.sees("#connection", "connected")
-    assert at_rest(robot.status())
+    driver.sees("#connection", CONNECTED)
+    driver.catches_up()
+    robot.stays_at_rest()
     driver.page.mouse.up()
 
 
@@ -124,7 +125,7 @@ def test_another_panel_lets_go(driver: Operator, robot: Robot) -> None:
     driver.pulls(".stick", right=0.0, up=0.9)
     robot.comes_to(moving(0.2))
     driver.page.evaluate("() => { location.hash = '#devices'; }")
-    robot.comes_to_rest(LEASE_S)
+    robot.comes_to_rest(UNHELD_S)
     driver.page.mouse.up()
 
 
@@ -132,7 +133,7 @@ def test_a_page_that_freezes_leaves_a_robot_at_rest(driver: Operator, robot: Rob
     driver.pulls(".stick", right=0.0, up=0.9)
     robot.comes_to(moving(0.2))
     driver.page.evaluate("() => void setTimeout(() => { const end = Date.now() + 2500; while (Date.now() < end); })")
-    robot.comes_to_rest(LEASE_S)
+    robot.comes_to_rest(UNHELD_S)
     driver.page.mouse.up()
 
 
@@ -153,12 +154,13 @@ def test_a_gamepad_drives_while_its_dead_man_button_is_held(pad_driver: Operator
     pad_driver.page.evaluate(SET_PAD, [DEAD_MAN, True, SPEED_AXIS, -0.9])
     robot.comes_to(moving(0.2))
     pad_driver.page.evaluate(SET_PAD, [DEAD_MAN, False, SPEED_AXIS, -0.9])
-    robot.comes_to_rest(LEASE_S)
+    robot.comes_to_rest(UNHELD_S)
 
 
 def test_a_gamepad_whose_stick_is_off_its_middle_does_not_begin_to_drive(pad_driver: Operator, robot: Robot) -> None:
     pad_driver.page.evaluate(SET_PAD, [DEAD_MAN, True, SPEED_AXIS, -0.9])
     pad_driver.sees("[data-panel=drive]", "Let the sticks go back to their middle")
+    pad_driver.catches_up()
     assert robot.status()["motions"] == []
 
 
@@ -166,7 +168,7 @@ def test_a_button_of_the_gamepad_stops_the_robot_that_somebody_else_drives(pad_d
     robot.call("drive.parallel", angle_deg=0.0, speed_m_s=0.3, duration_s=60.0, wait=False)
     robot.comes_to(moving(0.2))
     pad_driver.page.evaluate(SET_PAD, [STOP_BUTTON, True, SPEED_AXIS, 0.0])
-    robot.comes_to_rest(LEASE_S)
+    robot.comes_to_rest(UNHELD_S)
 
 
 def test_what_the_vehicle_cannot_do_is_disabled_with_its_reason(meet: Meet, fleet: Fleet) -> None:
@@ -177,9 +179,9 @@ def test_what_the_vehicle_cannot_do_is_disabled_with_its_reason(meet: Meet, flee
     for method, reason in (("drive.rotate", "cannot turn about its own centre"), ("steer", "no wheel pairs")):
         form = f"form[data-motion='{method}']"
         operator.sees(form, reason)
-        assert operator.page.is_disabled(f"{form} button")
-    assert operator.page.is_disabled("#slider-yaw_rate")
-    assert operator.page.is_enabled("#slider-steering")
+        operator.comes_to(operator.page.locator(f"{form} button").is_disabled, True)
+    operator.comes_to(lambda: operator.page.is_enabled("#slider-steering"), True)
+    operator.comes_to(lambda: operator.page.is_disabled("#slider-yaw_rate"), True)
 
 
 def test_the_semi_trailer_steers_by_the_stick(meet: Meet, fleet: Fleet) -> None:
@@ -191,7 +193,7 @@ def test_the_semi_trailer_steers_by_the_stick(meet: Meet, fleet: Fleet) -> None:
     operator.pulls(".stick", right=-0.7, up=0.7)
     driven = truck.comes_to(lambda status: status["vehicle"]["steering_deg"] > 5.0 and max(speeds(status)) > 0.05)
     operator.page.mouse.up()
-    truck.comes_to_rest(LEASE_S)
+    truck.comes_to_rest(UNHELD_S)
     assert not math.isclose(driven["vehicle"]["pose"]["x_m"], truck.status()["vehicle"]["pose"]["x_m"])
 
 
@@ -209,4 +211,4 @@ def test_a_thumb_on_a_phone_drives(meet: Meet, robot: Robot) -> None:
     touch.send("Input.dispatchTouchEvent", {"type": "touchMove", "touchPoints": [up]})
     robot.comes_to(moving(0.2))
     touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
-    robot.comes_to_rest(LEASE_S)
+    robot.comes_to_rest(UNHELD_S)

@@ -7,16 +7,13 @@ from contextlib import contextmanager
 
 import pytest
 
-from vcan_tests.station.browser import Operator
+from vcan_tests.station.browser import CONNECTED, Operator
 from vcan_tests.station.conftest import Meet
-from vcan_tests.station.processes import REST_M_S, Fleet, Robot, at_rest, speeds
+from vcan_tests.station.processes import REST_M_S, UNHELD_S, Fleet, Robot, speeds
 from vcan_tests.station.wire import Wire, wire_to
 
 pytestmark = pytest.mark.station
 
-LEASE_S = 1.5
-RAMP_S = 0.8
-"""From the speed that is driven here, by the ramp of a drive."""
 LOST = (r"WebSocket connection", r"^failed: ", r"console error: Failed to load resource", r"^50\d: ")
 """What a browser itself tells of a connection that is lost."""
 
@@ -43,7 +40,7 @@ def driver(meet: Meet, wire: Wire, robot: Robot) -> Operator:
 @contextmanager
 def at_rest_from_now_on(robot: Robot) -> Iterator[None]:
     """The robot comes to rest, and stands all the time while the ``with`` block lasts."""
-    robot.comes_to_rest(LEASE_S + RAMP_S)
+    robot.comes_to_rest(UNHELD_S)
     with robot.watched() as fastest:
         yield
     assert fastest.speed_m_s < REST_M_S
@@ -56,9 +53,9 @@ def test_a_network_that_is_cut_stops_the_robot_and_the_page_comes_back_by_itself
     with at_rest_from_now_on(robot):
         driver.sees("#connection", "reconnecting")
         wire.mend()
-        driver.sees("#connection", "^.?\\s?connected")
+        driver.sees("#connection", CONNECTED)
         driver.sees("#notes", "connection to the robot is lost")
-        driver.page.wait_for_timeout(500.0)
+        driver.catches_up()
     driver.page.mouse.up()
 
 
@@ -68,11 +65,11 @@ def test_a_network_that_is_frozen_stops_the_robot_and_the_page_says_that_its_val
     wire.freeze()
     with at_rest_from_now_on(robot):
         driver.sees("#connection", "stale|reconnecting")
-        assert driver.page.get_attribute("body", "data-stale") == "true"
+        driver.comes_to(lambda: driver.page.get_attribute("body", "data-stale"), "true")
         wire.thaw()
-        driver.sees("#connection", "^.?\\s?connected")
-        assert driver.page.get_attribute("body", "data-stale") is None
-        driver.page.wait_for_timeout(500.0)
+        driver.sees("#connection", CONNECTED)
+        driver.comes_to(lambda: driver.page.get_attribute("body", "data-stale"), None)
+        driver.catches_up()
     driver.page.mouse.up()
 
 
@@ -84,7 +81,7 @@ def test_a_network_that_loses_only_what_the_page_sends_stops_the_robot_and_the_p
         driver.sees("#notes", "let go, and hold it again to drive")
         driver.sees("#state", "idle")
         wire.thaw()
-        driver.page.wait_for_timeout(500.0)
+        driver.catches_up()
     driver.page.mouse.up()
 
 
@@ -95,8 +92,8 @@ def test_a_network_that_is_frozen_for_long_is_given_up_and_comes_back(
     with at_rest_from_now_on(robot):
         driver.sees("#connection", "reconnecting")
         wire.thaw()
-        driver.sees("#connection", "^.?\\s?connected")
-        driver.page.wait_for_timeout(500.0)
+        driver.sees("#connection", CONNECTED)
+        driver.catches_up()
     driver.page.mouse.up()
 
 
@@ -104,9 +101,9 @@ def test_after_the_network_is_back_the_robot_drives_when_the_stick_is_let_go_of_
     driver: Operator, wire: Wire, robot: Robot
 ) -> None:
     wire.cut()
-    robot.comes_to_rest(LEASE_S + RAMP_S)
+    robot.comes_to_rest(UNHELD_S)
     wire.mend()
-    driver.sees("#connection", "^.?\\s?connected")
+    driver.sees("#connection", CONNECTED)
     driver.page.mouse.up()
     driver.take_seat()
     driver.pulls(".stick", right=0.0, up=0.6)
@@ -121,7 +118,7 @@ def test_a_stop_without_a_connection_is_said_not_to_have_been_sent(driver: Opera
     driver.page.click("#stop")
     driver.sees("#alarms", "NOT SENT")
     wire.mend()
-    driver.sees("#connection", "^.?\\s?connected")
+    driver.sees("#connection", CONNECTED)
 
 
 def test_a_station_that_dies_leaves_the_robot_at_rest_and_the_page_finds_it_again(
@@ -131,28 +128,29 @@ def test_a_station_that_dies_leaves_the_robot_at_rest_and_the_page_finds_it_agai
     with at_rest_from_now_on(robot):
         driver.sees("#connection", "reconnecting")
         fleet.station.begin_again()
-        driver.sees("#connection", "^.?\\s?connected")
+        driver.sees("#connection", CONNECTED)
     driver.page.mouse.up()
 
 
 def test_a_daemon_that_dies_is_told_of_and_found_again(driver: Operator, robot: Robot) -> None:
     robot.kill()
     driver.sees("#connection", "reconnecting")
-    assert driver.page.get_attribute("body", "data-stale") == "true"
+    driver.comes_to(lambda: driver.page.get_attribute("body", "data-stale"), "true")
     robot.begin_again()
     robot.wait_until_ready()
-    driver.sees("#connection", "^.?\\s?connected")
+    driver.sees("#connection", CONNECTED)
     driver.sees("#state", "idle")
     driver.page.mouse.up()
-    assert at_rest(robot.status())
+    driver.catches_up()
+    robot.stays_at_rest()
 
 
 def test_a_daemon_that_is_stopped_in_mid_air_makes_the_values_stale(
     driver: Operator, robot: Robot, expected_errors: list[str]
 ) -> None:
     driver.page.mouse.up()
-    robot.comes_to_rest(LEASE_S + RAMP_S)
+    robot.comes_to_rest(UNHELD_S)
     with robot.suspended():
         driver.sees("#connection", "stale|reconnecting")
         driver.sees("#stale", "old")
-    driver.sees("#connection", "^.?\\s?connected")
+    driver.sees("#connection", CONNECTED)

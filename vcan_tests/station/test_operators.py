@@ -6,7 +6,7 @@ import pytest
 
 from vcan_tests.station.browser import Operator
 from vcan_tests.station.conftest import Meet
-from vcan_tests.station.processes import Robot, at_rest, speeds
+from vcan_tests.station.processes import UNHELD_S, Robot, speeds
 
 pytestmark = pytest.mark.station
 
@@ -42,16 +42,16 @@ def test_the_second_cannot_drive_and_is_told_why(first: Operator, second: Operat
     second.go_to("drive")
     second.sees("[data-panel=drive]", "has the robot: wait, or take it over")
     second.pulls(".stick", right=0.0, up=-0.6)
-    second.page.wait_for_timeout(300.0)
+    second.catches_up()
     second.page.mouse.up()
-    assert not at_rest(robot.status())
+    assert min(speeds(robot.status())) > MOVING_M_S
     first.page.mouse.up()
 
 
 def test_a_takeover_stops_the_first_and_both_see_it(first: Operator, second: Operator, robot: Robot) -> None:
     second.sees("#holder", "has the robot")
     second.page.click("#takeover")
-    robot.comes_to_rest(1.5)
+    robot.comes_to_rest(UNHELD_S)
     second.sees("#holder", "you have the robot")
     first.sees("#holder", r"(?<!you) has the robot")
     first.sees("#notes", "has the robot|taken the robot over")
@@ -60,7 +60,7 @@ def test_a_takeover_stops_the_first_and_both_see_it(first: Operator, second: Ope
     second.pulls(".stick", right=0.0, up=0.6)
     robot.comes_to(lambda status: min(speeds(status)) > MOVING_M_S)
     second.page.mouse.up()
-    robot.comes_to_rest(1.5)
+    robot.comes_to_rest(UNHELD_S)
 
 
 def test_what_was_taken_over_is_given_back(first: Operator, second: Operator, robot: Robot) -> None:
@@ -70,6 +70,7 @@ def test_what_was_taken_over_is_given_back(first: Operator, second: Operator, ro
     first.page.mouse.up()
     second.page.click("#takeover")
     first.sees("#holder", "^$")
+    first.take_seat()
     first.pulls(".stick", right=0.0, up=0.6)
     robot.comes_to(lambda status: min(speeds(status)) > MOVING_M_S)
     first.page.mouse.up()
@@ -77,5 +78,5 @@ def test_what_was_taken_over_is_given_back(first: Operator, second: Operator, ro
 
 def test_a_page_that_is_closed_gives_the_robot_back(first: Operator, second: Operator, robot: Robot) -> None:
     first.page.close()
-    robot.comes_to_rest(1.5)
+    robot.comes_to_rest(UNHELD_S)
     second.sees("#holder", "^$")

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+import re
+from typing import Any
+
 import pytest
 
-from vcan_tests.station.browser import Operator
-from vcan_tests.station.processes import Robot, Status, at_rest, speeds
+from vcan_tests.station.browser import CONNECTED, Operator
+from vcan_tests.station.processes import UNHELD_S, Robot, Status, speeds
 
 pytestmark = pytest.mark.station
 
 ROBOTS = ("max2d",)
 DRIVE = "front_left"
-LEASE_S = 1.5
 SLOW_RPM = 100.0
+DRIVES = 4
 CARD = f"article[aria-label='Drive {DRIVE}']"
 FORWARD = f"{CARD} button.hold:last-of-type"
 OBJECTS, SIMULATION = "[data-panel=objects]", "[data-panel=simulation]"
 RAMP = "0x6083"
 CONNECT_ANEW = "import('/page/station.js').then(({station}) => (station.choose(null), station.choose('max2d')))"
-HAS_STATUS = "import('/page/station.js').then(({station}) => station.status !== null)"
 
 MANY_EVENTS = """import('/page/events.js').then(({EventLog}) => {
     const log = new EventLog();
@@ -34,9 +36,10 @@ def turning(status: Status) -> bool:
 
 
 def sees_devices(operator: Operator) -> None:
-    """Open the panel of devices; returns when their values are drawn, and nothing moves any more."""
+    """Open the panel of devices; returns when all values are drawn, and no later one pushes the buttons down."""
     operator.go_to("devices")
-    operator.sees(CARD, r"Velocity\s+\S+ rpm")
+    whole = operator.page.locator("article", has_text=re.compile(r"Velocity.*A continuous", re.DOTALL))
+    operator.comes_to(whole.count, DRIVES)
 
 
 def jogs(operator: Operator, robot: Robot) -> None:
@@ -45,7 +48,7 @@ def jogs(operator: Operator, robot: Robot) -> None:
     operator.page.locator(FORWARD).scroll_into_view_if_needed()
     operator.page.hover(FORWARD)
     operator.page.mouse.down()
-    robot.comes_to(turning, within_s=5.0)
+    robot.comes_to(turning)
 
 
 def test_a_drive_is_enabled_and_disabled_from_its_card(operator: Operator, robot: Robot) -> None:
@@ -60,7 +63,7 @@ def test_a_drive_is_enabled_and_disabled_from_its_card(operator: Operator, robot
 def test_a_motor_turns_as_long_as_its_button_is_held(operator: Operator, robot: Robot) -> None:
     jogs(operator, robot)
     operator.page.mouse.up()
-    robot.comes_to_rest(within_s=2.0)
+    robot.comes_to_rest(UNHELD_S)
 
 
 def test_a_button_that_is_pressed_again_at_once_turns_the_motor_again(operator: Operator, robot: Robot) -> None:
@@ -68,28 +71,26 @@ def test_a_button_that_is_pressed_again_at_once_turns_the_motor_again(operator: 
     first = robot.status()["motions"][0]["motion"]
     operator.page.mouse.up()
     operator.page.mouse.down()
-    robot.comes_to(lambda status: not status["motions"] or status["motions"][0]["motion"] != first, within_s=5.0)
-    operator.until(
-        lambda: turning(robot.status()), lambda: f"not turning: {operator.text(CARD)} {operator.text('#notices')}"
-    )
+    robot.comes_to(lambda status: turning(status) and status["motions"][0]["motion"] != first)
     operator.page.mouse.up()
-    robot.comes_to_rest(within_s=2.0)
+    robot.comes_to_rest(UNHELD_S)
+    operator.catches_up()
     assert operator.text("#alarms") == ""
 
 
 def test_a_motor_that_is_jogged_stops_when_the_page_is_gone(operator: Operator, robot: Robot) -> None:
     jogs(operator, robot)
     operator.page.close()
-    robot.comes_to_rest(within_s=LEASE_S + 1.0)
+    robot.comes_to_rest(UNHELD_S)
 
 
 def test_a_motor_that_is_jogged_by_a_key_stops_when_the_focus_goes_elsewhere(operator: Operator, robot: Robot) -> None:
     sees_devices(operator)
     operator.page.focus(FORWARD)
     operator.page.keyboard.down("Enter")
-    robot.comes_to(turning, within_s=5.0)
+    robot.comes_to(turning)
     operator.page.focus("#robot")
-    robot.comes_to_rest(within_s=2.0)
+    robot.comes_to_rest(UNHELD_S)
     operator.page.keyboard.up("Enter")
 
 
@@ -100,7 +101,8 @@ def test_a_jog_that_is_too_fast_is_refused_in_words(operator: Operator, robot: R
     operator.page.mouse.down()
     operator.sees("#alarms", "beyond the limit of front_left.*ask for less")
     operator.page.mouse.up()
-    assert at_rest(robot.status())
+    operator.catches_up()
+    robot.stays_at_rest()
 
 
 def test_the_statusword_is_told_in_words_where_somebody_asks(operator: Operator) -> None:
@@ -122,9 +124,7 @@ def test_a_fault_is_told_with_its_cure_and_counted_on_the_tab(
     )
     operator.go_to("events")
     operator.sees("ol.events", r"error\s+max2d: front_left\s+.*over-temperature")
-    operator.until(
-        lambda: operator.page.get_attribute("[data-tab=events]", "data-unread") is None, lambda: "they are still new"
-    )
+    operator.comes_to(lambda: operator.page.get_attribute("[data-tab=events]", "data-unread"), None)
 
 
 def test_a_node_without_power_is_told_as_lost_and_its_values_as_old(
@@ -136,7 +136,7 @@ def test_a_node_without_power_is_told_as_lost_and_its_values_as_old(
     operator.go_to("devices")
     operator.sees(CARD, "lost: not heard")
     operator.sees(CARD, "the last before it was lost")
-    assert operator.page.is_disabled(FORWARD)
+    operator.comes_to(lambda: operator.page.is_disabled(FORWARD), True)
     operator.go_to("simulation")
     operator.page.click(f"button[aria-label='On: power of {DRIVE}']")
     operator.go_to("devices")
@@ -153,10 +153,11 @@ def test_events_are_filtered_by_words(operator: Operator) -> None:
 def test_events_of_an_earlier_connection_are_kept_once(operator: Operator) -> None:
     operator.go_to("events")
     operator.sees("[data-panel=events]", "configured, started and guarded")
+    operator.catches_up()
     before = operator.page.locator("ol.events li").count()
     operator.page.evaluate(CONNECT_ANEW)
-    operator.sees("#connection", "connected")
-    operator.until(lambda: operator.page.evaluate(HAS_STATUS), lambda: "no status came")
+    operator.sees("#connection", CONNECTED)
+    operator.catches_up()
     assert operator.page.locator("ol.events li").count() == before
 
 
@@ -182,6 +183,7 @@ def test_an_object_is_found_by_its_name_and_read(operator: Operator, robot: Robo
 def test_an_object_that_can_only_be_read_has_no_field_for_a_value(operator: Operator) -> None:
     chooses(operator, "statusword")
     operator.sees(f"{OBJECTS} .value", "switch on disabled")
+    operator.catches_up()
     assert not operator.page.is_visible(f"{OBJECTS} form")
 
 
@@ -206,30 +208,38 @@ def test_a_value_that_does_not_fit_is_refused_in_the_daemons_words(operator: Ope
     operator.sees(f"{OBJECTS} [role=status].value", "'fast' is no whole number.*takes a whole number")
 
 
+def faults(robot: Robot) -> list[dict[str, Any]]:
+    """The faults that were set, as the daemon tells them."""
+    found: list[dict[str, Any]] = robot.call("simulation.faults")["faults"]
+    return found
+
+
 def test_all_wheels_are_put_on_ice_and_back(operator: Operator, robot: Robot) -> None:
     operator.go_to("simulation")
     operator.page.click("text=All wheels on ice")
     operator.sees(SIMULATION, "Take the ice from rear_left")
-    faults = robot.call("simulation.faults")["faults"]
-    assert {(fault["kind"], fault["friction"]) for fault in faults} == {("ice", 0.02)}
-    assert {fault["part"] for fault in faults} == {"front_left", "front_right", "rear_left", "rear_right"}
+    wheels = ("front_left", "front_right", "rear_left", "rear_right")
+    operator.comes_to(
+        lambda: {fault["part"]: fault["friction"] for fault in faults(robot)}, dict.fromkeys(wheels, 0.02)
+    )
     operator.page.click("text=Take all ice away")
     operator.sees(SIMULATION, "No fault is set")
-    assert robot.call("simulation.faults")["faults"] == []
+    operator.comes_to(lambda: faults(robot), [])
 
 
 def test_a_kind_of_fault_is_asked_for_what_it_takes_alone(operator: Operator, robot: Robot) -> None:
     operator.go_to("simulation")
     form = f"{SIMULATION} form.fault-form"
     operator.page.select_option(f"{form} select >> nth=0", "ice")
-    labels = operator.page.locator(f"{form} .field label").all_text_contents()
-    assert [label.split()[0] for label in labels] == ["part", "friction", "for", "at", "at"]
+    labels = operator.page.locator(f"{form} .field label")
+    fields = ["part", "friction", "for", "at", "at"]
+    operator.comes_to(lambda: [label.split()[0] for label in labels.all_text_contents()], fields)
     operator.page.select_option(f"{form} select >> nth=0", "encoder_jump")
     operator.page.select_option(f"{form} select >> nth=1", "front")
     operator.page.fill(f"{form} input >> nth=0", "1")
     operator.page.click("text=Set this fault")
-    operator.sees(SIMULATION, "encoder_jump")
-    (fault,) = robot.call("simulation.faults")["faults"]
+    operator.sees(f"{SIMULATION} table", "encoder_jump angle_deg 1")
+    (fault,) = faults(robot)
     assert (fault["kind"], fault["part"], fault["angle_deg"]) == ("encoder_jump", "front", 1.0)
 
 
@@ -247,7 +257,7 @@ def test_a_slope_rolls_a_robot_that_nobody_holds(operator: Operator, robot: Robo
     operator.page.fill(f"{SIMULATION} form[aria-label=Slope] input >> nth=0", "15")
     operator.page.click(f"{SIMULATION} >> text=Tilt")
     operator.sees(SIMULATION, "The floor has a slope of 15°")
-    robot.comes_to(lambda status: max(speeds(status)) > 0.02, within_s=10.0)
+    robot.comes_to(lambda status: max(speeds(status)) > 0.02)
     operator.page.click("text=Make level")
     operator.sees(SIMULATION, "The floor is level")
 
@@ -260,6 +270,4 @@ def test_the_speed_of_time_is_set_and_told_as_the_daemon_has_it(operator: Operat
     operator.go_to("drive")
     robot.call("simulation.pace", factor=1.0)
     operator.go_to("simulation")
-    operator.until(
-        lambda: operator.page.input_value("text=Time passes at") == "1", lambda: "it is told as it was set before"
-    )
+    operator.comes_to(lambda: operator.page.input_value("text=Time passes at"), "1")

@@ -12,13 +12,14 @@ import pytest
 from profiles.path_file import load_path_file
 from vcan_tests.station.browser import Operator
 from vcan_tests.station.conftest import Meet
-from vcan_tests.station.processes import Fleet, Robot, at_rest, speeds
+from vcan_tests.station.processes import UNHELD_S, Fleet, Robot, speeds
 from vcan_tests.station.test_driving import HIDE
 
 pytestmark = pytest.mark.station
 
 ROBOTS = ("semitrailer",)
 PANEL = "[data-panel=paths]"
+PIECES = f"{PANEL} .path-pieces tbody tr"
 MAP, POINTER = "[data-panel=map] canvas", "[data-panel=map] .map-cursor"
 CURSOR = re.compile(r"x (.?[\d.]+) m, y (.?[\d.]+) m")
 LARGEST_ERROR_M = 0.05
@@ -40,9 +41,10 @@ def press(operator: Operator, name: str, within: str = PANEL) -> None:
 
 def insert(operator: Operator, kind: str, **numbers: str) -> None:
     """Put a piece behind the last one, with these numbers."""
-    rows = operator.page.locator(f"{PANEL} .path-pieces tbody tr")
+    rows = operator.page.locator(PIECES)
     row = rows.nth(rows.count())
     press(operator, f"Insert {'an arc' if kind == 'arc' else 'a line'}")
+    row.wait_for()
     for label, number in numbers.items():
         row.get_by_label(re.compile(label, re.IGNORECASE)).fill(number)
     operator.page.keyboard.press("Tab")
@@ -77,8 +79,7 @@ def test_a_path_is_drawn_and_followed_backwards_to_its_end(drawer: Operator, rob
     drawer.page.mouse.click(*on_map(trailer["x_m"] - 0.8, trailer["y_m"]))
     drawer.page.click("button[data-tool=arc]")
     drawer.page.mouse.click(*on_map(trailer["x_m"] - 1.6, trailer["y_m"] + 0.25))
-    pieces = drawer.page.locator(f"{PANEL} .path-pieces tbody tr")
-    drawer.until(lambda: pieces.count() == 2, lambda: f"the path has {pieces.count()} pieces")
+    drawer.comes_to(drawer.page.locator(PIECES).count, 2)
     drawer.sees(PANEL, "Can be driven")
     drawer.page.click("#path-drive")
     following = robot.comes_to(lambda status: status["vehicle"]["following"])["vehicle"]["following"]
@@ -104,8 +105,8 @@ def test_a_path_that_cannot_be_driven_says_so_while_it_is_drawn(drawer: Operator
     drawer.sees(PANEL, "Can be driven")
     insert(drawer, "arc", radius="0.2")
     drawer.sees(PANEL, "Cannot be driven:.*radius of 0.200 m.*widen the arc")
-    assert drawer.page.is_disabled("#path-drive")
-    assert drawer.page.locator(f"{PANEL} tr[data-wrong]").count() == 1
+    drawer.comes_to(lambda: drawer.page.is_disabled("#path-drive"), True)
+    drawer.comes_to(drawer.page.locator(f"{PANEL} tr[data-wrong]").count, 1)
     drawer.page.keyboard.press("Escape")
     press(drawer, "Undo")
     drawer.sees(PANEL, "Can be driven")
@@ -124,7 +125,7 @@ def test_the_end_of_a_piece_is_dragged_and_snaps(drawer: Operator) -> None:
     drawer.page.mouse.move(*on_map(pose["x_m"] + 0.62 * heading[0], pose["y_m"] + 0.62 * heading[1]), steps=4)
     drawer.page.mouse.up()
     length = drawer.page.get_by_label("Length of piece 0 in metres")
-    drawer.until(lambda: length.input_value() == "0.6", lambda: f"it is {length.input_value()} m long")
+    drawer.comes_to(length.input_value, "0.6")
 
 
 def test_a_path_is_saved_loaded_and_read_by_the_command_line(drawer: Operator, fleet: Fleet, robot: Robot) -> None:
@@ -137,7 +138,7 @@ def test_a_path_is_saved_loaded_and_read_by_the_command_line(drawer: Operator, f
     drawer.sees(PANEL, "No path yet")
     press(drawer, "Load")
     drawer.sees(PANEL, "to-the-bay is in the editor")
-    assert drawer.page.get_by_label("Radius of piece 1 in metres").input_value() == "2"
+    drawer.comes_to(drawer.page.get_by_label("Radius of piece 1 in metres").input_value, "2")
     (kept,) = fleet.folder.glob(f"state/canhelm/{robot.name}/paths/*.yaml")
     assert [piece.line_m or piece.radius_m for piece in load_path_file(kept).spec.pieces] == [1.5, 2.0]
 
@@ -164,6 +165,8 @@ def test_a_path_is_deleted_only_when_somebody_says_so(drawer: Operator, fleet: F
     drawer.page.select_option("#path-kept", "old")
     press(drawer, "Delete")
     kept = Path(fleet.folder, "state/canhelm", robot.name, "paths", "old.yaml")
+    drawer.page.get_by_role("button", name="Delete for good").wait_for()
+    drawer.catches_up()
     assert kept.exists()
     press(drawer, "Delete for good")
     drawer.sees(PANEL, "old is deleted")
@@ -176,8 +179,8 @@ def test_the_way_that_is_driven_is_recorded_as_lines_and_arcs(drawer: Operator, 
     robot.call("drive.path", path={"pieces": [{"line_m": 0.8}, {"arc_deg": 30, "radius_m": 1.5}]})
     press(drawer, "End the recording")
     drawer.sees(PANEL, r"The recorded way is in the editor: 1\.\d+ m, \d pieces")
-    drawer.sees(PANEL, "drive")
-    assert drawer.page.locator(f"{PANEL} .path-pieces tbody tr").count() >= 2
+    pieces = drawer.page.locator(PIECES)
+    drawer.until(lambda: pieces.count() >= 2, lambda: f"the path has {pieces.count()} pieces")
 
 
 @pytest.fixture
@@ -192,21 +195,22 @@ def following(drawer: Operator, robot: Robot) -> Operator:
 
 def test_the_space_bar_ends_a_path(following: Operator, robot: Robot) -> None:
     following.page.keyboard.press("Space")
-    robot.comes_to_rest(1.5)
+    robot.comes_to_rest(UNHELD_S)
     following.sees(PANEL, "not driven to its end")
 
 
 def test_a_page_that_is_hidden_ends_a_path(following: Operator, robot: Robot) -> None:
     following.page.evaluate(HIDE, True)
-    robot.comes_to_rest(2.0)
+    robot.comes_to_rest(UNHELD_S)
     following.page.evaluate(HIDE, False)
     following.sees(PANEL, "not driven to its end")
-    assert at_rest(robot.status())
+    following.catches_up()
+    robot.stays_at_rest()
 
 
 def test_a_page_that_is_closed_ends_a_path(following: Operator, robot: Robot) -> None:
     following.page.close()
-    robot.comes_to_rest(2.0)
+    robot.comes_to_rest(UNHELD_S)
 
 
 def test_a_second_page_shows_the_path_that_is_driven(following: Operator, meet: Meet, robot: Robot) -> None:
@@ -217,7 +221,7 @@ def test_a_second_page_shows_the_path_that_is_driven(following: Operator, meet: 
     driven = "[data-panel=map] canvas[aria-label*='following a path']"
     second.page.wait_for_selector(driven)
     following.page.click("#path-stop")
-    robot.comes_to_rest(1.5)
+    robot.comes_to_rest(UNHELD_S)
 
 
 def test_a_run_shows_its_picture_and_is_downloaded(operator: Operator, robot: Robot) -> None:
@@ -226,7 +230,7 @@ def test_a_run_shows_its_picture_and_is_downloaded(operator: Operator, robot: Ro
     runs = "[data-panel=runs]"
     operator.sees(runs, "drive.path")
     operator.page.locator(f"{runs} tbody button").first.click()
-    operator.page.wait_for_selector(f"{runs} img.run-picture", state="visible", timeout=30_000)
+    operator.page.wait_for_selector(f"{runs} img.run-picture", state="visible", timeout=60_000)
     operator.page.locator(f"{runs} tbody summary").first.click()
     with operator.page.expect_download() as download:
         operator.page.locator(f"{runs} a[download]", has_text="run.yaml").first.click()

@@ -11,14 +11,15 @@ from PIL import Image
 
 from vcan_tests.station.browser import DESKTOP, PANELS, PHONE, Operator
 from vcan_tests.station.conftest import Meet
-from vcan_tests.station.processes import Robot, speeds
+from vcan_tests.station.processes import Robot
 from vcan_tests.station.suite import PICTURES
 from vcan_tests.station.test_paths import PANEL, insert
 
 pytestmark = pytest.mark.station
 
 ROBOTS = ("semitrailer",)
-PATH = {"pieces": [{"line_m": 1.0}, {"arc_deg": 60, "radius_m": 1.2}, {"drive": "backward", "line_m": 0.8}]}
+SHOWN_M = 0.5
+"""Of the path is driven before the first picture."""
 FEWEST_COLOURS = 12
 """A page on which nothing is drawn has fewer."""
 LARGEST_BYTES = 150_000
@@ -50,7 +51,7 @@ def begin_to_drive(operator: Operator, robot: Robot) -> None:
     insert(operator, "line", length="0.5")
     operator.sees(PANEL, "Can be driven")
     operator.page.click("#path-drive")
-    robot.comes_to(lambda status: max(speeds(status)) > 0.1)
+    robot.comes_to(lambda status: (status["vehicle"]["following"] or {}).get("progress_m", 0.0) > SHOWN_M)
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -58,19 +59,19 @@ def test_the_panels_at_a_desktop(meet: Meet, robot: Robot, folder: Path, scheme:
     operator = meet(**DESKTOP, color_scheme=scheme)
     operator.open(robot.name)
     begin_to_drive(operator, robot)
-    operator.page.wait_for_timeout(4000.0)
     panels = [panel for panel in PANELS if panel != "map"] if scheme == "light" else ["paths"]
     for panel in sorted(panels, key=lambda panel: panel != "paths"):
         operator.go_to(panel)
         if panel == "objects":
             operator.page.fill("[data-panel=objects] input[type=search]", "0x6083")
             operator.page.get_by_role("button", name="0x6083").click()
+            operator.sees("[data-panel=objects] .value", "rpm/s")
         if panel == "runs":
             robot.comes_to(lambda status: not status["motions"])
             operator.page.get_by_role("button", name="Reload").click()
             operator.page.locator("[data-panel=runs] tbody button").first.click()
-            operator.page.wait_for_selector("img.run-picture", state="visible", timeout=30_000)
-        operator.page.wait_for_timeout(500.0)
+            operator.page.wait_for_selector("img.run-picture", state="visible", timeout=60_000)
+        operator.catches_up()
         take(operator, folder, f"desktop-{panel}" if scheme == "light" else f"desktop-{panel}-dark")
 
 
@@ -81,5 +82,5 @@ def test_the_panels_on_a_phone(meet: Meet, robot: Robot, folder: Path) -> None:
     for panel in sorted(PANELS, key=lambda panel: panel not in ("paths", "map")):
         operator.go_to(panel)
         operator.page.evaluate("() => scrollTo(0, 0)")
-        operator.page.wait_for_timeout(700.0)
+        operator.catches_up()
         take(operator, folder, f"phone-{panel}")

@@ -6,13 +6,13 @@ import pytest
 
 from vcan_tests.station.browser import PANELS, Operator
 from vcan_tests.station.conftest import Meet
-from vcan_tests.station.processes import Robot, at_rest, speeds
+from vcan_tests.station.processes import Robot, speeds
 
 pytestmark = pytest.mark.station
 
 SPEED_M_S = 0.4
-REST_S = 1.5
-"""From 0.4 m/s by the quick stop's ramp."""
+REST_S = 10.0
+"""The motion would go on for a minute; how soon a stop acts is measured elsewhere (``latency.py``)."""
 
 
 @pytest.fixture
@@ -49,8 +49,9 @@ def test_a_space_in_a_text_field_is_a_space_and_behind_escape_it_is_a_stop(opera
     operator.go_to("events")
     search = "[data-panel=events] input[type=search]"
     operator.page.type(search, "a b")
-    assert operator.page.input_value(search) == "a b"
-    assert not at_rest(driving.status())
+    operator.comes_to(lambda: operator.page.input_value(search), "a b")
+    operator.catches_up()
+    assert driving.status()["state"] == "active"
     operator.page.keyboard.press("Escape")
     operator.page.keyboard.press("Space")
     driving.comes_to_rest(REST_S)
@@ -59,9 +60,9 @@ def test_a_space_in_a_text_field_is_a_space_and_behind_escape_it_is_a_stop(opera
 @pytest.mark.parametrize("panel", [name for name in PANELS if name != "map"])
 def test_the_stop_is_in_reach_on_every_panel(operator: Operator, panel: str) -> None:
     operator.go_to(panel)
-    operator.page.mouse.wheel(0.0, 5000.0)
-    covered = operator.page.evaluate(TOP_ELEMENT, "#stop")
-    assert covered == "stop"
+    operator.catches_up()
+    operator.page.evaluate("() => scrollTo(0, 5000)")
+    operator.comes_to(lambda: operator.page.evaluate(TOP_ELEMENT, "#stop"), "stop")
 
 
 TOP_ELEMENT = """selector => {
@@ -80,10 +81,12 @@ def test_the_emergency_stop_is_latched_until_somebody_resets_it_twice(
     operator.sees("#latched", "reset")
     assert driving.status()["state"] == "estop"
     operator.page.click("#reset")
+    operator.sees("#reset", "It is safe")
+    operator.catches_up()
     assert driving.status()["state"] == "estop"
     operator.page.click("#reset")
     operator.sees("#state", "idle")
-    assert operator.page.is_hidden("#latched")
+    operator.comes_to(lambda: operator.page.is_hidden("#latched"), True)
 
 
 def test_while_the_emergency_stop_is_latched_nothing_can_be_driven_and_the_reason_is_told(
@@ -95,9 +98,9 @@ def test_while_the_emergency_stop_is_latched_nothing_can_be_driven_and_the_reaso
     operator.go_to("drive")
     operator.sees("[data-panel=drive]", "emergency stop is latched")
     operator.pulls(".stick", right=0.0, up=0.9)
-    operator.page.wait_for_timeout(300.0)
+    operator.catches_up()
     operator.page.mouse.up()
-    assert at_rest(robot.status())
+    robot.stays_at_rest()
 
 
 def test_two_people_may_press_stop_at_once(meet: Meet, driving: Robot) -> None:

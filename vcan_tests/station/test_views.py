@@ -44,7 +44,7 @@ def test_no_panel_has_a_finding_of_the_accessibility_checker(
     found = {}
     for panel in panels_of(size):
         operator.go_to(panel)
-        operator.page.wait_for_timeout(150.0)
+        operator.catches_up()
         found[panel] = findings(operator.page, *rules)
     assert found == {panel: [] for panel in found}
 
@@ -54,7 +54,7 @@ def test_the_narrowest_phone_scrolls_no_panel_sideways_and_shows_the_stop(meet: 
     operator.open(robot.name)
     for panel in PANELS:
         operator.go_to(panel)
-        operator.page.wait_for_timeout(100.0)
+        operator.catches_up()
         wide = operator.page.evaluate("() => document.documentElement.scrollWidth")
         assert (panel, wide, operator.page.evaluate(TOO_WIDE)) == (panel, 320, [])
         operator.page.evaluate("() => scrollTo(0, 10000)")
@@ -66,12 +66,14 @@ def test_a_phone_on_its_side_shows_the_stop(meet: Meet, robot: Robot) -> None:
     operator.open(robot.name)
     for panel in panels_of("desktop"):
         operator.go_to(panel)
+        operator.catches_up()
         assert (panel, operator.page.evaluate(FULLY_SEEN, "#stop")) == (panel, True)
 
 
 def test_a_page_zoomed_to_twice_its_size_shows_the_stop(meet: Meet, robot: Robot) -> None:
     operator = meet(viewport={"width": 640, "height": 400}, device_scale_factor=2)
     operator.open(robot.name)
+    operator.catches_up()
     assert operator.page.evaluate(FULLY_SEEN, "#stop")
 
 
