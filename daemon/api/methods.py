@@ -378,5 +378,5 @@ METHODS: dict[str, Method] = {
 
 NOTIFICATIONS = {
     "status": "params as the result of status, plus lost_samples",
-    "event": "time_s, severity (info, warning, error), source, message, remedy",
+    "event": "time_s, unix_s (time of day), severity (info, warning, error), source, message, remedy",
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
@@ -207,8 +208,8 @@ def _event(event: Mapping[str, Any]) -> RenderableType:
     from rich.text import Text
 
     remedy = f" - {event['remedy']}" if event.get("remedy") else ""
-    when = words(event.get("time_s"), digits=7)
+    when = time.strftime("%H:%M:%S", time.localtime(event.get("unix_s")))
     severity = str(event.get("severity"))
     return Text.assemble(
-        f"{when} s  ", (severity, _colour(severity)), f"  {event.get('source')}: {event.get('message')}{remedy}"
+        f"{when}  ", (severity, _colour(severity)), f"  {event.get('source')}: {event.get('message')}{remedy}"
     )

@@ -8,6 +8,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
+from daemon.runtime.time_of_day import unix_s
+
 LOGGER = logging.getLogger("canhelm")
 KEPT = 200
 _LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
@@ -29,8 +31,8 @@ class EventLog:
             message: what happened, one sentence.
             remedy: what to do next; empty where there is nothing to do.
         """
-        now = asyncio.get_running_loop().time()
-        event = {"time_s": round(now, 6), "severity": severity, "source": source, "message": message, "remedy": remedy}
+        times = {"time_s": round(asyncio.get_running_loop().time(), 6), "unix_s": round(unix_s(), 3)}
+        event = {**times, "severity": severity, "source": source, "message": message, "remedy": remedy}
         self.events.append(event)
         LOGGER.log(_LEVELS[severity], "%s: %s%s", source, message, f" ({remedy})" if remedy else "")
         for listener in self.listeners:

@@ -25,3 +25,9 @@ def epoch_s(trouble: ComputerTrouble) -> float:
     loop = asyncio.get_running_loop()
     machine_s = 0.0 if isinstance(loop, VirtualTimeLoop) else time.time() - loop.time()
     return min(max(0.0, machine_s + trouble.clock_jump_s), LATEST_S)
+
+
+def unix_s() -> float:
+    """Seconds since 1970 by the clock that dates the lines of the log; on virtual time by the loop's."""
+    loop = asyncio.get_running_loop()
+    return loop.time() if isinstance(loop, VirtualTimeLoop) else time.time()

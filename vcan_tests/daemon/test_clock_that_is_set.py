@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 
 from daemon.runs.store import FRAMES, RunStore, read_runs
-from daemon.runtime.clock import run_virtual
+from daemon.runtime.clock import run_patient, run_virtual
+from daemon.runtime.events import EventLog
 from daemon.runtime.time_of_day import LATEST_S, epoch_s
 from drivers.bus.candump import LogFrame, parse_line
 from drivers.simulated.computer_trouble import ComputerTrouble
@@ -128,3 +129,17 @@ async def test_the_epoch_follows_the_machines_clock(monkeypatch: pytest.MonkeyPa
     before_s, now_s = epoch_s(ComputerTrouble()), time.time()
     monkeypatch.setattr(time, "time", lambda: now_s + 3600.0)
     assert epoch_s(ComputerTrouble()) == pytest.approx(before_s + 3600.0, abs=5.0)
+
+
+async def unix_s_of_an_event() -> float:
+    """When the log of events says that something happens now."""
+    log = EventLog()
+    log.add("info", "test", "something happens")
+    return float(log.events[0]["unix_s"])
+
+
+def test_an_event_is_dated_by_the_machines_clock_and_on_virtual_time_by_the_loops() -> None:
+    before_s = time.time()
+    dated_s = run_patient(unix_s_of_an_event())
+    assert before_s - 0.001 <= dated_s <= time.time() + 0.001
+    assert run_virtual(unix_s_of_an_event()) == 0.0

@@ -18,6 +18,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import time
 import types
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -29,7 +30,7 @@ import pytest
 
 from canhelm import protocol
 from daemon.app import App
-from daemon.cli import record
+from daemon.cli import record, status
 from daemon.cli.main import build_app, main
 from daemon.runs.store import RunStore
 from profiles.faults import load_faults
@@ -132,6 +133,7 @@ class Player:
         patch.setattr(protocol, "find_sockets", lambda: [folder / "robot.sock"] if self.daemon else [])
         patch.setattr(protocol, "open_socket", self._connect)
         patch.setattr(record, "time", types.SimpleNamespace(monotonic=lambda: self._running().now_s))
+        patch.setattr(status, "time", types.SimpleNamespace(strftime=time.strftime, localtime=time.gmtime))
         patch.setattr(sys, "stdin", self._desk)
         for name, value in {**ENVIRONMENT, "CANHELM_RUNS": str(folder / "runs")}.items():
             patch.setenv(name, value)

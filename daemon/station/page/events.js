@@ -28,7 +28,7 @@ export class EventLog {
   /**
    * @param {object} event as the daemon tells it
    * @param {string} robot whose daemon
-   * @param {number} at_ms when it was, by this machine's clock
+   * @param {number} at_ms when it was, since 1970
    * @returns {object|null} what was added; null where it is known
    */
   add(event, robot, at_ms) {
@@ -79,7 +79,7 @@ class EventsPanel {
     const tools = h("div", { class: "row" }, h("label", {}, "Show ", this.#severity),
       h("label", {}, "that hold ", this.#search), copy);
     this.element = h("section", { class: "events-panel" }, h("h2", {}, "Events"), tools, this.#told, this.#list);
-    station.on("event", (event) => this.#take([event], () => Date.now()));
+    station.on("event", (event) => this.#take([event]));
     station.on("status", (status) => this.#takeAll(status));
     station.on("robot", () => this.#read());
     addEventListener("hashchange", () => this.#read());
@@ -87,16 +87,16 @@ class EventsPanel {
   }
 
   /** A status tells the last events, too: those that came while there was no connection. */
-  #takeAll({ events, time_s }) {
+  #takeAll({ events }) {
     this.#read();
     const latest = events?.at(-1);
     if (!latest || this.#log.knows(latest, this.#station.robot)) return;
-    const now_ms = Date.now();
-    this.#take(events, (event) => now_ms - 1000 * (time_s - event.time_s));
+    this.#take(events);
   }
 
-  #take(events, timeOf) {
-    const added = events.map((event) => this.#add(event, timeOf(event))).filter(Boolean);
+  /** The daemon dates an event as it dates the lines of its log; one that is older than this page does not. */
+  #take(events) {
+    const added = events.map((event) => this.#add(event, 1000 * event.unix_s || Date.now())).filter(Boolean);
     if (!added.length) return;
     if (!this.#isVisible()) this.#unread += added.filter((event) => event.severity !== "info").length;
     this.#tellUnread();
