@@ -54,6 +54,7 @@ def test_a_stop_on_one_page_is_told_on_the_other(pages: tuple[Operator, Operator
     second.page.click("#stop")
     first.sees("#notes", f"stop was pressed on {name_of(second)}")
     second.sees("#notes", "stopped")
+    second.catches_up()
     assert "stop was pressed" not in second.text("#notes")
     first.page.mouse.up()
 
