@@ -117,7 +117,7 @@ class DrivePanel {
     const reason = this.#station.cannot("drive.set");
     if (!reason) return;
     this.#setPoints.releaseAll();
-    this.#station.say(`not driving any more: ${reason}`, "warning");
+    if (this.#station.status?.state !== "estop") this.#station.say(`not driving any more: ${reason}`, "warning");
   }
 
   #show() {

@@ -2,14 +2,13 @@
 
 import { badge } from "./badge.js";
 import { attribute, h, text } from "./dom.js";
+import { clockTime, inPageWords } from "./words.js";
 
 const MOST = 500;
 /** Kind of badge by severity; the word is the severity itself. */
 const KINDS = { info: "muted", warning: "warn", error: "bad" };
 /** Severities that a choice of the filter shows. */
 const SHOWN = { all: ["info", "warning", "error"], warning: ["warning", "error"], error: ["error"] };
-
-const clock = new Intl.DateTimeFormat([], { hour: "2-digit", minute: "2-digit", second: "2-digit", hour12: false });
 
 /** What has happened since the page was opened, in all its connections; bounded, each event once. */
 export class EventLog {
@@ -54,10 +53,10 @@ export function lineOf({ robot, at_ms, severity, source, message, remedy }) {
 }
 
 function rowOf({ robot, at_ms, severity, source, message, remedy }) {
-  const when = h("time", { datetime: new Date(at_ms).toISOString() }, clock.format(at_ms));
+  const when = h("time", { datetime: new Date(at_ms).toISOString() }, clockTime(at_ms));
   const top = h("p", { class: "aside" }, when, " ", badge(KINDS[severity] ?? "warn", severity), ` ${robot}: ${source}`);
-  return h("li", { class: "event", "data-severity": severity }, top, h("p", {}, message),
-    remedy && h("p", { class: "remedy" }, `What to do: ${remedy}`));
+  return h("li", { class: "event", "data-severity": severity }, top, h("p", {}, inPageWords(message)),
+    remedy && h("p", { class: "remedy" }, `What to do: ${inPageWords(remedy)}`));
 }
 
 class EventsPanel {

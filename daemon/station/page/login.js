@@ -1,8 +1,12 @@
 /** Who the page's person is, and which robots there are: asked again and again over HTTP. */
 
+import { Absent } from "./absent.js";
 import { h } from "./dom.js";
 
 const PERIOD_MS = 2000;
+/** Characters of a line of the tokens' file: more is something else. */
+const LONGEST = 1000;
+const ROLE_BEFORE = /^(watch|drive|configure)\s+/;
 
 /**
  * Ask for the login where one is needed, then keep the choice of robots up to date.
@@ -10,10 +14,14 @@ const PERIOD_MS = 2000;
  * @param {object} station see station.js
  */
 export function watchLogin(station) {
+  const absent = new Absent(station, (robot) => choose(station, robot));
   const look = async () => {
-    await lookForRobots(station);
+    seen = await lookForRobots(station);
+    absent.show(seen);
     setTimeout(look, PERIOD_MS);
   };
+  let seen = { robots: [] };
+  for (const kind of ["connected", "robot"]) station.on(kind, () => absent.show(seen));
   look();
   document.getElementById("logout").addEventListener("click", () => logOut(station));
 }
@@ -23,10 +31,12 @@ async function lookForRobots(station) {
     const { login_needed, role } = await fetched("session");
     document.getElementById("logout").hidden = !login_needed || !role;
     showLogin(station, login_needed && !role);
-    if (login_needed && !role) return;
-    offer(station, (await fetched("robots")).robots);
+    if (login_needed && !role) return { robots: [] };
+    const { robots } = await fetched("robots");
+    offer(station, robots);
+    return { robots };
   } catch {
-    // the station does not answer: the connection tells so
+    return { robots: [], answers: false };
   }
 }
 
@@ -70,20 +80,22 @@ function showLogin(station, needed) {
 }
 
 function form(station) {
-  const token = h("input", { id: "token", type: "password", autocomplete: "current-password", required: true });
+  const token = h("input", { id: "token", type: "password", autocomplete: "current-password" });
   const trouble = h("p", { class: "bad", role: "alert" });
   const send = h("button", { type: "submit", class: "main" }, "Log in");
   const asking = h("form", {}, h("label", { for: "token" }, "Token"), token, send, trouble);
   asking.addEventListener("submit", async (event) => {
     event.preventDefault();
     send.disabled = true;
-    trouble.textContent = await logIn(token.value);
+    const typed = token.value.trim();
+    trouble.textContent = whyNoToken(typed) || (await logIn(typed.replace(ROLE_BEFORE, "")));
     send.disabled = false;
     if (!trouble.textContent) await lookForRobots(station);
   });
   return [
     h("h2", { id: "login-title" }, "Log in"),
-    h("p", {}, "This control station asks for a token. Whoever has set it up gives you one."),
+    h("p", {}, "This control station asks for a token. Whoever has set it up gives you one; a whole line of the file",
+      " of tokens will do, too."),
     asking,
   ];
 }
@@ -93,6 +105,13 @@ async function logOut(station) {
   station.choose(null);
   await station.attempt(fetch("logout", { method: "POST" }), "logging out");
   showLogin(station, true);
+}
+
+/** Why something cannot be a token; empty where it may be one. */
+function whyNoToken(typed) {
+  if (!typed) return "Type or paste the token first.";
+  if (typed.length > LONGEST) return `These are ${typed.length} characters: paste the one line with your token.`;
+  return /\s/.test(typed.replace(ROLE_BEFORE, "")) ? "A token has no spaces: paste the one line with yours." : "";
 }
 
 /** What went wrong, for people; empty where the login is done. */

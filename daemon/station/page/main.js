@@ -66,6 +66,7 @@ choose();
 addEventListener("hashchange", () => {
   choose();
   main.focus({ preventScroll: true });
+  scrollTo(0, 0);
 });
 WIDE.addEventListener("change", choose);
 station.on("robot", choose);

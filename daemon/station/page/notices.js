@@ -1,6 +1,7 @@
 /** What is told to people in passing; errors stay longer, and what has a key until it is unsaid. */
 
 import { h } from "./dom.js";
+import { inPageWords } from "./words.js";
 
 const SHOWN_MS = { info: 5000, warning: 12000, error: 20000 };
 const WORDS = { info: "Note", warning: "Warning", error: "Error" };
@@ -21,13 +22,14 @@ function find(list, key) {
 function add(list, { text, severity, remedy, key }) {
   find(list, key ?? text)?.remove();
   const close = h("button", { type: "button", class: "close", "aria-label": "Close this notice" }, "×");
-  const words = h("p", {}, h("strong", {}, `${WORDS[severity]}: `), text, remedy && h("span", {}, ` – ${remedy}`));
+  const words = h("p", {}, h("strong", {}, `${WORDS[severity]}: `), inPageWords(text),
+    remedy && h("span", {}, ` – ${inPageWords(remedy)}`));
   const notice = h("div", { class: `notice ${severity}`, "data-key": key ?? text }, words, close);
   close.addEventListener("click", () => notice.remove());
-  list.append(notice);
+  list.prepend(notice);
   if (key) return;
   notice.dataset.passing = "";
   const passing = list.querySelectorAll("[data-passing]");
-  if (passing.length > MOST) passing[0].remove();
+  if (passing.length > MOST) passing[MOST].remove();
   setTimeout(() => notice.remove(), SHOWN_MS[severity]);
 }

@@ -82,7 +82,7 @@ export class SetPoints {
       const took_s = (performance.now() - begun_ms) / 1000;
       if (took_s > LINK_LOST_S) this.#lose(`the robot answered after ${took_s.toFixed(1)} s, and has stopped`);
     } catch (error) {
-      this.#lose(error.remedy ? `${error.message} – ${error.remedy}` : error.message);
+      this.#lose(error.remedy ? `${error.message} – ${error.remedy}` : error.message, isLatched(error));
     } finally {
       this.#asked = false;
       if (!this.#source) this.#endMotion();
@@ -93,13 +93,13 @@ export class SetPoints {
   #follow(motion) {
     if (motion === this.#motion) return;
     this.#motion = motion;
-    const over = (why) => {
+    const over = (why, told) => {
       if (motion !== this.#motion) return;
       this.#motion = null;
-      this.#lose(why);
+      this.#lose(why, told);
     };
     const end = this.#station.call("motion.wait", { motion }, { timeout_ms: 0 });
-    end.then(() => over("the motion is over"), (error) => over(error.message));
+    end.then(() => over("the motion is over"), (error) => over(error.message, isLatched(error)));
   }
 
   #endMotion() {
@@ -113,11 +113,11 @@ export class SetPoints {
   }
 
   /** Drive no more before the control was let go of and held again. */
-  #lose(why) {
+  #lose(why, told = false) {
     const source = this.#source;
     if (!source) return;
     this.#rest();
-    this.#station.say(`${why}: ${NO_MORE}`, "warning");
+    if (!told) this.#station.say(`${why}: ${NO_MORE}`, "warning");
     source.onLost();
   }
 
@@ -132,4 +132,9 @@ export class SetPoints {
     this.#motion = null;
     this.#lose("the connection to the robot is lost");
   }
+}
+
+/** Whether an emergency stop is the reason, which the header tells. */
+function isLatched(error) {
+  return error.data?.type === "EmergencyStop";
 }
