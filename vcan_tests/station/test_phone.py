@@ -1,0 +1,57 @@
+"""On a phone: what is told lies over nothing that drives or stops, and each panel begins at its top."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from vcan_tests.station.browser import PHONE, Operator
+from vcan_tests.station.conftest import Meet
+from vcan_tests.station.processes import Robot
+from vcan_tests.station.test_views import NARROW
+
+pytestmark = pytest.mark.station
+
+LOW: dict[str, Any] = {**PHONE, "viewport": {"width": 667, "height": 375}}
+SIZES = {"phone": PHONE, "narrow": NARROW, "on its side": LOW}
+SAY = """async () => {
+    const { station } = await import("/page/station.js");
+    for (const n of [1, 2, 3]) station.say(`something went wrong, number ${n}: ${"why ".repeat(40)}`, "error", "wait");
+}"""
+COVERED = """selector => {
+    const element = document.querySelector(selector);
+    if (!element.closest("header")) element.scrollIntoView({ block: "center" });
+    const box = element.getBoundingClientRect();
+    const over = document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);
+    return Boolean(over?.closest("#notices"));
+}"""
+
+
+@pytest.fixture(params=list(SIZES))
+def holder(request: pytest.FixtureRequest, meet: Meet, robot: Robot) -> Operator:
+    """Somebody who holds a phone, before the panel for driving."""
+    operator = meet(**SIZES[request.param])
+    operator.open(robot.name)
+    operator.take_seat()
+    return operator
+
+
+def test_notices_cover_neither_stop_nor_what_drives_and_can_be_closed(holder: Operator) -> None:
+    holder.page.evaluate(SAY)
+    holder.sees("#alarms", "number 3")
+    for selector in ("#stop", "#estop", ".stick", "#slider-speed", "#slider-fastest"):
+        assert (selector, holder.page.evaluate(COVERED, selector)) == (selector, False)
+    for left in (2, 1, 0):
+        holder.page.tap("#notices .close >> nth=0")
+        assert holder.page.locator(".notice").count() == left
+
+
+def test_another_panel_begins_at_its_top(meet: Meet, robot: Robot) -> None:
+    operator = meet(**PHONE)
+    operator.open(robot.name)
+    operator.go_to("devices")
+    operator.page.evaluate("() => scrollTo(0, 600)")
+    operator.until(lambda: operator.page.evaluate("() => scrollY > 300"), lambda: "it does not scroll")
+    operator.go_to("simulation")
+    operator.until(lambda: operator.page.evaluate("() => scrollY === 0"), lambda: "it begins in its middle")
