@@ -97,7 +97,10 @@ class CurrentAndMotion:
             misfit = self._late(current_a, lacks_m_s, speed_m_s, commanded_m_s, dt_s)
             if misfit is not None:
                 return misfit
-        return self._dragged(current_a, abs(speed_m_s))
+        if abs(current_a) >= self.limits.weak_a:
+            self._slowest_m_s = None
+            return None
+        return self._dragged(abs(speed_m_s))
 
     def _late(
         self, current_a: float, lacks_m_s: float, speed_m_s: float, commanded_m_s: float, dt_s: float
@@ -120,12 +123,8 @@ class CurrentAndMotion:
             return Misfit.IN_VAIN
         return Misfit.NONE if abs(towards_a) < limits.weak_a else None
 
-    def _dragged(self, current_a: float, speed_m_s: float) -> Misfit | None:
-        """Whether the wheel has become faster by more than its share without current."""
-        limits = self.limits
-        if abs(current_a) >= limits.weak_a:
-            self._slowest_m_s = None
-            return None
+    def _dragged(self, speed_m_s: float) -> Misfit | None:
+        """Whether a wheel without current has become faster by more than its share."""
         slowest = self._slowest_m_s
         self._slowest_m_s = speed_m_s if slowest is None else min(slowest, speed_m_s)
-        return Misfit.NONE if speed_m_s - self._slowest_m_s >= limits.gain_m_s else None
+        return Misfit.NONE if speed_m_s - self._slowest_m_s >= self.limits.gain_m_s else None

@@ -135,13 +135,13 @@ class Cycle:
 
     def _run(self) -> None:
         self._waiting = False
-        if self._deadline is not None:
-            self._deadline.cancel()
-            self._deadline = None
         now = self._loop.time()
         dt = self.period_s if self._last_step_s is None else min(now - self._last_step_s, LONGEST_STEP * self.period_s)
         self._last_step_s = now
         self._step(now, dt)
+        if self._deadline is not None:
+            self._deadline.cancel()
+            self._deadline = None
         counters = self.counters
         counters.cycles += 1
         if now >= self._mark[0] + 1.0:

@@ -44,6 +44,7 @@ class Stopping:
         estop_reason: why the emergency stop is latched; empty while it is not.
         cause: the fault that is latched.
         closing: the daemon goes down: nothing begins any more.
+        halts: how many stops were commanded so far.
     """
 
     def __init__(
@@ -58,6 +59,7 @@ class Stopping:
         self.estop_reason = ""
         self.cause: DeviceFault | None = None
         self.closing = False
+        self.halts = 0
         self.brakes = BrakeKeeper(devices, vehicle.brakes, tasks, self._on_failure)
         self.rest = RestWatch()
         self._devices = devices
@@ -201,6 +203,7 @@ class Stopping:
 
     def _halt(self, error: CanhelmError) -> None:
         """Command the stop, now: RPDO3 to every drive that has power or is about to, brakes to engage, motions over."""
+        self.halts += 1
         for drive in self._drives:
             if drive.node_state is NodeState.READY and drive.state is not DriveState.FAULT:
                 drive.quick_stop()

@@ -235,29 +235,38 @@ class Supervisor:
     # --- the cycle ---------------------------------------------------------------------------------------------
 
     def step(self, now_s: float, dt_s: float) -> None:
-        """One control step: measure, watch, ask the motions, pass the gate, transmit."""
-        vehicle = self.vehicle
+        """One control step: measure, watch, ask the motions, pass the gate, transmit.
+
+        What no target has to wait for comes after that.
+        """
+        vehicle, halts = self.vehicle, self._stopping.halts
         measurement = self.measurement = vehicle.measure(now_s)
-        self._stopping.rest.look((*measurement.wheel_speed_m_s, *[drive.speed_m_s for drive in vehicle.aside]))
+        powered = self.powered
         self._holding.watch()
-        self._watch_devices(now_s)
-        self._watch_readings(measurement, dt_s)
+        self._watch_devices(now_s, powered=powered)
+        self._watch_readings(measurement, dt_s, powered=powered)
         wanted = self._ask_motions(measurement, dt_s)
         command, self.active_limits = vehicle.gate(wanted, measurement, self.command, dt_s)
         self.command = command
+        self._transmit(command, now_s + self._stale_s)
+        vehicle.observe(measurement)
         if command.release_brake:
             self.brakes.follow(command.release_brake)
-        deadline, ready = now_s + self._stale_s, NodeState.READY
+        self._rolling.look(now_s, powered=powered)
+        if halts == self._stopping.halts:  # of a stop that has just been commanded these readings tell nothing
+            self._stopping.rest.look((*measurement.wheel_speed_m_s, *[drive.speed_m_s for drive in vehicle.aside]))
+        for observer in self.observers:
+            observer()
+
+    def _transmit(self, command: Command, deadline_s: float) -> None:
+        vehicle, ready = self.vehicle, NodeState.READY
         for drive, speed in zip(vehicle.drives, command.wheel_speed_m_s, strict=True):
             if drive.node_state is ready:
                 drive.command_speed(speed)
-                drive.transmit(deadline)
+                drive.transmit(deadline_s)
         for drive in vehicle.aside:
             if drive.node_state is ready:
-                drive.transmit(deadline)
-        vehicle.observe(measurement)
-        for observer in self.observers:
-            observer()
+                drive.transmit(deadline_s)
 
     def _ask_motions(self, measurement: Measurement, dt_s: float) -> Command:
         command = self.vehicle.zero
@@ -274,17 +283,15 @@ class Supervisor:
             command = asked if command is self.vehicle.zero else _sum(command, asked)
         return command
 
-    def _watch_devices(self, now_s: float) -> None:
+    def _watch_devices(self, now_s: float, *, powered: bool) -> None:
         if not self._stopping.estop_reason and (pressed := self._stopping.pressed):
             self.estop(pressed)
         if not self._stopping.latched:
-            fault = self._watch.look(now_s, powered=self.powered)
+            fault = self._watch.look(now_s, powered=powered)
             if fault is not None:
                 self.fault(fault)
 
-    def _watch_readings(self, measurement: Measurement, dt_s: float) -> None:
-        powered = self.powered
-        self._rolling.look(measurement.time_s, powered=powered)
+    def _watch_readings(self, measurement: Measurement, dt_s: float, *, powered: bool) -> None:
         powered = powered and not self._stopping.latched
         driving = powered and any(motion.kind in self.vehicle.methods for motion in self.motions.values())
         fault = self._plausibility.look(measurement, self.command, dt_s, powered=powered, driving=driving)

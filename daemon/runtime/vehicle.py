@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from enum import StrEnum
+from operator import attrgetter
 from typing import Any, Final
 
 from canhelm.errors import LimitExceeded
@@ -20,6 +21,7 @@ from profiles.schema import Limits, Profile
 BRICK_DELAY_S: Final = 0.5
 """What a stop takes to reach a brick's motor, and its rest to come back, a few turnarounds of Bluetooth; assumed."""
 _ROUNDING: Final = 1e-9
+_SPEED, _POSITION, _HEADING = attrgetter("speed_m_s"), attrgetter("position_m"), attrgetter("heading_rad")
 
 
 class VehicleState(StrEnum):
@@ -92,7 +94,8 @@ class Vehicle(ABC):
         self.brakes = brakes
         self.aside: tuple[Drive, ...] = ()
         self.zero = Command((0.0,) * len(drives))
-        self._current_signs = [profile.drives[drive.name].direction for drive in drives] if profile.traction else []
+        signed = drives if profile.traction else ()
+        self._currents = [(profile.drives[drive.name].direction, drive) for drive in signed]
         self._gate = Gate(profile.limits, profile.vehicle, wheel_acceleration_m_s2)
 
     def measure(self, now_s: float) -> Measurement:
@@ -100,15 +103,16 @@ class Vehicle(ABC):
         return self._readings(now_s)
 
     def _readings(self, now_s: float, acceleration_m_s2: tuple[float, float] | None = None) -> Measurement:
+        drives, brakes = self.drives, self.brakes
         return Measurement(
             now_s,
-            tuple([drive.speed_m_s for drive in self.drives]),
-            tuple([drive.position_m for drive in self.drives]),
-            tuple([encoder.heading_rad for encoder in self.encoders]),
-            tuple([brake.state is BrakeState.ENGAGED for brake in self.brakes]),
-            tuple([brake.state is BrakeState.RELEASED for brake in self.brakes]),
+            tuple(map(_SPEED, drives)),
+            tuple(map(_POSITION, drives)),
+            tuple(map(_HEADING, self.encoders)),
+            tuple([brake.state is BrakeState.ENGAGED for brake in brakes]),
+            tuple([brake.state is BrakeState.RELEASED for brake in brakes]),
             acceleration_m_s2,
-            tuple([sign * drive.current_a for sign, drive in zip(self._current_signs, self.drives, strict=False)]),
+            tuple([sign * drive.current_a for sign, drive in self._currents]),
         )
 
     def gate(

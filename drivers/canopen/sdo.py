@@ -98,6 +98,7 @@ class SdoClient:
         self._channel: BlockChannel | None = None
         self._turn = asyncio.Lock()
         self._object: SdoObject = (0, 0)
+        self._address: Address = (0, 0)
         self._expected = (AnswerKind.ABORT, 0)
         self._waiter: asyncio.Future[SdoAnswer] | None = None
 
@@ -157,9 +158,9 @@ class SdoClient:
     async def read_raw(self, obj: SdoObject, timeout_s: float | None = None) -> bytes:
         """The little-endian bytes of an object; raises as :meth:`read` does."""
         async with self._turn:
-            self._object = obj
+            self._object, self._address = obj, _address(obj)
             timeout = timeout_s or self._timeout_s
-            answer = await self._exchange(make_upload(*_address(obj)), AnswerKind.UPLOAD, 0, timeout)
+            answer = await self._exchange(make_upload(*self._address), AnswerKind.UPLOAD, 0, timeout)
             if answer.last:
                 size = obj.type.bits // 8 if isinstance(obj, ObjectDef) else 0
                 return answer.data[: size or 4] if not answer.sized else answer.data
@@ -170,11 +171,11 @@ class SdoClient:
     async def write_raw(self, obj: SdoObject, data: bytes, timeout_s: float | None = None) -> None:
         """Write the little-endian bytes of an object; raises as :meth:`write` does."""
         async with self._turn:
-            self._object = obj
+            self._object, self._address = obj, _address(obj)
             timeout = timeout_s or self._timeout_s
             if self.blocks and len(data) >= BLOCK_FROM_BYTES and await self._download_blocks(data, timeout):
                 return
-            await self._exchange(make_download(*_address(obj), data), AnswerKind.DOWNLOAD, 0, timeout)
+            await self._exchange(make_download(*self._address, data), AnswerKind.DOWNLOAD, 0, timeout)
             if not 1 <= len(data) <= 4:
                 await self._download_segments(data, timeout)
 
@@ -206,7 +207,7 @@ class SdoClient:
             self.blocks = False
             return await self._upload_segments(timeout_s)
         if value is None:
-            await self._exchange(make_upload(*_address(self._object)), AnswerKind.UPLOAD, 0, timeout_s)
+            await self._exchange(make_upload(*self._address), AnswerKind.UPLOAD, 0, timeout_s)
             return await self._upload_segments(timeout_s)
         return value
 
@@ -221,7 +222,7 @@ class SdoClient:
 
     async def _in_blocks(self, transfer: Callable[[BlockChannel], Awaitable[bytes]], timeout_s: float) -> bytes | None:
         """Carry out a block transfer; None where the server does not know them."""
-        channel = self._channel = BlockChannel(self._request, _address(self._object), timeout_s)
+        channel = self._channel = BlockChannel(self._request, self._address, timeout_s)
         try:
             return await transfer(channel)
         except BlockRefused as refusal:
@@ -290,11 +291,11 @@ class SdoClient:
 
     def _fits(self, answer: SdoAnswer) -> bool:
         if answer.kind is AnswerKind.ABORT:
-            return answer.address == _address(self._object)
+            return answer.address == self._address
         kind, toggle = self._expected
         if answer.kind is not kind:
             return False
-        return answer.toggle == toggle if kind in _SEGMENTS else answer.address == _address(self._object)
+        return answer.toggle == toggle if kind in _SEGMENTS else answer.address == self._address
 
     def give_up(self, reason: str) -> None:
         """End the transfer that is running: the node has restarted and will not answer it."""
@@ -311,7 +312,7 @@ class SdoClient:
             waiter.set_exception(self._error(NodeAbsent, reason, NO_ANSWER_REMEDY))
 
     def _abort(self, code: int) -> None:
-        self._request(make_abort(*_address(self._object), code))
+        self._request(make_abort(*self._address, code))
 
     def _request(self, data: bytes) -> None:
         self._send(REQUEST_COB_ID + self.node, data, asyncio.get_running_loop().time() + self._timeout_s)

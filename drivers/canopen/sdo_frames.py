@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import struct
 from enum import IntEnum
-from typing import NamedTuple
+
+import msgspec
 
 MAX_UPLOAD_BYTES = 65536
 """A node that sends more than this in one transfer is stopped."""
 
 _INITIATE = struct.Struct("<BHB4s")
 _ABORT = struct.Struct("<BHBI")
+_pack, _unpack = _INITIATE.pack, _INITIATE.unpack
 
 Address = tuple[int, int]
 """Index and sub-index of an object."""
@@ -26,11 +28,11 @@ class AnswerKind(IntEnum):
     ABORT = 4
 
 
-_KINDS = tuple(AnswerKind)
-_NO_ANSWER = len(_KINDS) << 5
+_KINDS = (*AnswerKind, None, None, None)
+"""By the command specifier; the last three are none of an answer."""
 
 
-class SdoAnswer(NamedTuple):
+class SdoAnswer(msgspec.Struct, frozen=True, gc=False):
     """One answer of an SDO server.
 
     Attributes:
@@ -53,7 +55,7 @@ class SdoAnswer(NamedTuple):
 
 def make_upload(index: int, sub: int) -> bytes:
     """Request to read an object."""
-    return _INITIATE.pack(0x40, index, sub, b"")
+    return _pack(0x40, index, sub, b"")
 
 
 def make_download(index: int, sub: int, data: bytes) -> bytes:
@@ -80,18 +82,21 @@ def make_abort(index: int, sub: int, code: int) -> bytes:
 
 def parse_answer(data: bytes) -> SdoAnswer | None:
     """The answer in 8 bytes from an SDO server, or None where it is none."""
-    if len(data) != 8 or data[0] >= _NO_ANSWER:
+    if len(data) != 8:
         return None
-    kind, toggle = _KINDS[data[0] >> 5], data[0] >> 4 & 1
+    command, index, sub, value = _unpack(data)
+    kind = _KINDS[command >> 5]
     if kind is AnswerKind.UPLOAD:
-        command, index, sub, value = _INITIATE.unpack(data)
-        expedited, sized = bool(command & 2), bool(command & 1)
+        expedited, sized = command & 2 != 0, command & 1 != 0
         if expedited and sized:
             value = value[: 4 - (command >> 2 & 3)]
         return SdoAnswer(kind, (index, sub), 0, value, expedited, sized)
+    if kind is None:
+        return None
+    toggle = command >> 4 & 1
     if kind is AnswerKind.UPLOAD_SEGMENT:
-        return SdoAnswer(kind, toggle=toggle, data=data[1 : 8 - (data[0] >> 1 & 7)], last=bool(data[0] & 1))
+        return SdoAnswer(kind, toggle=toggle, data=data[1 : 8 - (command >> 1 & 7)], last=command & 1 != 0)
     if kind is AnswerKind.DOWNLOAD_SEGMENT:
         return SdoAnswer(kind, toggle=toggle)
-    _, index, sub, code = _ABORT.unpack(data)
-    return SdoAnswer(kind, (index, sub), code=code if kind is AnswerKind.ABORT else 0)
+    code = int.from_bytes(value, "little") if kind is AnswerKind.ABORT else 0
+    return SdoAnswer(kind, (index, sub), code=code)
