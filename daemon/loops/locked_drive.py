@@ -42,5 +42,7 @@ class LockedDrive:
 
     def slipped_pair(self, heading_rad: tuple[float, ...]) -> int | None:
         """The pair that turned through its brake, by the measured headings, or None."""
-        pairs = enumerate(zip(heading_rad, self.heading_rad, strict=True))
-        return next((pair for pair, (now, locked) in pairs if not abs(now - locked) <= BRAKE_SLIP_RAD), None)
+        for pair, locked in enumerate(self.heading_rad):
+            if not abs(heading_rad[pair] - locked) <= BRAKE_SLIP_RAD:
+                return pair
+        return None

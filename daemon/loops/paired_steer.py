@@ -212,9 +212,11 @@ class PairedSteerLaw:
         endless = self._target is not None and self._target.distance_m is None
         return RESTEER_RAD if endless else self._tolerance_rad
 
-    def _heading_error(self, heading_rad: tuple[float, ...], pair: int) -> float:
-        wanted = self._wanted_heading(pair)
-        return 0.0 if wanted is None else wanted - heading_rad[pair]
+    def _heading_errors(self, heading_rad: tuple[float, ...]) -> PerPair:
+        if self._target is None:
+            return (0.0, 0.0)
+        (rear, front), (rear_goal, front_goal) = heading_rad, self._target.headings_rad
+        return 0.0 if rear_goal is None else rear_goal - rear, 0.0 if front_goal is None else front_goal - front
 
     def _wanted_heading(self, pair: int) -> float | None:
         return None if self._target is None else self._target.headings_rad[pair]
@@ -223,8 +225,8 @@ class PairedSteerLaw:
         """The pair to turn next, front before rear; a target that stands still forever turns none."""
         if self._target is None or self._finished or (self._target.distance_m is None and not self._target.moves):
             return None
-        threshold = self._threshold_rad()
-        return next((p for p in (FRONT, REAR) if not abs(self._heading_error(heading_rad, p)) <= threshold), None)
+        threshold, errors = self._threshold_rad(), self._heading_errors(heading_rad)
+        return next((pair for pair in (FRONT, REAR) if not abs(errors[pair]) <= threshold), None)
 
     def _enter(self, phase: Phase) -> None:
         if phase is not self._phase:
@@ -284,7 +286,7 @@ class PairedSteerLaw:
 
     def _begin_turn(self, pair: int, measurement: Measurement) -> PerWheel:
         if self._turns[pair] >= MAX_TURNS:
-            error = math.degrees(self._heading_error(measurement.heading_rad, pair))
+            error = math.degrees(self._heading_errors(measurement.heading_rad)[pair])
             return self._fail(
                 f"the {PAIR_NAMES[pair]} pair does not hold its heading: {error:.2f} deg off after "
                 f"{MAX_TURNS} turns; check its brake"
@@ -335,7 +337,7 @@ class PairedSteerLaw:
     def _locked_headings(self, measurement: Measurement) -> PerPair:
         """Where the brakes hold the pairs: the target where they were steered to it, else the reading."""
         stop_rad = math.radians(self._geometry.max_heading_deg)
-        errors = [self._heading_error(measurement.heading_rad, pair) for pair in (REAR, FRONT)]
+        errors = self._heading_errors(measurement.heading_rad)
         rear, front = (
             heading + error if abs(error) <= self._tolerance_rad else clamp(heading, stop_rad)
             for heading, error in zip(measurement.heading_rad, errors, strict=True)
@@ -369,10 +371,7 @@ class PairedSteerLaw:
         return PairedSteerRecord(
             phase=self._phase,
             pair=None if self._pair is None else PAIR_NAMES[self._pair],
-            heading_error_rad=(
-                self._heading_error(measurement.heading_rad, REAR),
-                self._heading_error(measurement.heading_rad, FRONT),
-            ),
+            heading_error_rad=self._heading_errors(measurement.heading_rad),
             speed_m_s=self._speed_m_s,
             rim_speed_m_s=self._rim_speed_m_s if self._phase is Phase.TURNING_PAIR else 0.0,
             remaining_m=self._remaining_m,
@@ -387,5 +386,7 @@ class PairedSteerLaw:
         )
 
     def _limits_active(self) -> tuple[str, ...]:
+        if not (self._ramping or self._slips):
+            return ()
         active = {"acceleration": self._ramping, "traction": self._slips}
         return tuple(name for name, holds in active.items() if holds)

@@ -64,6 +64,8 @@ class Stopping:
         self.rest = RestWatch()
         self._devices = devices
         self._drives = tuple(devices.drives.values())
+        configs = vehicle.profile.drives
+        self._with_contact = [d for d in self._drives if d.name in configs and configs[d.name].emergency_stop]
         self._vehicle = vehicle
         self._motions = motions
         self._tasks = tasks
@@ -81,7 +83,7 @@ class Stopping:
     @property
     def pressed(self) -> str:
         """Which emergency stop contact demands a stop now; empty where none does."""
-        return next((reason for drive in self._drives if (reason := drive.emergency_stop)), "")
+        return next((reason for drive in self._with_contact if (reason := drive.emergency_stop)), "")
 
     @property
     def under_way(self) -> bool:

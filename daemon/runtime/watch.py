@@ -45,11 +45,10 @@ class DeviceWatch:
 
     def __init__(self, devices: Devices, period_s: float, bus: Bus, late_after_cycles: float = 1.0) -> None:
         self._bus = bus
-        self._devices = tuple(devices.by_node.values())
         self._by_node = devices.by_node
         self._period_s = period_s
         self._late_s = LATE_CYCLES * late_after_cycles * period_s
-        self._unread = {node: _Unread() for node in devices.by_node}
+        self._unread = [(device, _Unread()) for device in devices.by_node.values()]
         self._looked_s: float | None = None
         self._stall_end_s = -math.inf
         self._stall_s = 0.0
@@ -65,11 +64,10 @@ class DeviceWatch:
         if self._looked_s is not None and now_s - self._looked_s > self._late_s:
             self._stall_end_s, self._stall_s = now_s, now_s - self._looked_s - self._period_s
         self._looked_s = now_s
-        for device in self._devices:
+        for device, unread in self._unread:
             fault = device.fault
             if fault is not None and (powered or fault.code != 0):
                 return DeviceFault(fault.message, node=fault.node, value=fault.code or None, remedy=fault.remedy)
-            unread = self._unread[device.node]
             if device.reading_time_s != unread.since_s:
                 unread.since_s, unread.cycles = device.reading_time_s, 0
                 continue
@@ -83,7 +81,7 @@ class DeviceWatch:
         trouble = self._bus.trouble
         if trouble is not None:
             return trouble.message, trouble.remedy or ""
-        if all(unread.cycles >= SILENT_CYCLES for unread in self._unread.values()):
+        if all(unread.cycles >= SILENT_CYCLES for _, unread in self._unread):
             return "no node answers", "check the cable to the robot, and its power"
         return f"{device.who} is silent", "check its power and the CAN cable"
 

@@ -175,28 +175,24 @@ class SocketCanBus(Bus):
         return True
 
     def _on_readable(self) -> None:
-        error = self._receive()
-        if error is not None:
-            self._lose(error)
-
-    def _receive(self) -> OSError | None:
-        """Take what has come; the error that says that the interface is gone, if it does."""
+        """Take what has come, until nothing is left or a handler has closed the bus."""
         link = self._link
         if link is None:
-            return None
-        self._now_s = self._loop.time()
-        self._wall_to_loop_s = self._now_s - time.time()
+            return
+        self._now_s = now_s = self._loop.time()
+        self._wall_to_loop_s = now_s - time.time()
+        receive, take = link.recvmsg, self._take
         for _ in range(BATCH):
-            if link is not self._link:
-                break  # a handler closed the bus
             try:
-                packet, ancillary, flags, _ = link.recvmsg(LONGEST_PACKET_BYTES, ANCILLARY_BYTES)
+                packet, ancillary, flags, _ = receive(LONGEST_PACKET_BYTES, ANCILLARY_BYTES)
             except BlockingIOError:
-                break
+                return
             except OSError as error:
-                return error
-            self._take(packet, ancillary, flags)
-        return None
+                self._lose(error)
+                return
+            take(packet, ancillary, flags)
+            if link is not self._link:
+                return
 
     def _take(self, packet: bytes, ancillary: Ancillary, flags: int) -> None:
         frame = parse_frame(packet)
