@@ -122,8 +122,21 @@ def load_path_file(name_or_path: str | Path) -> PathFile:
         UsageError: there is none, or it has a mistake; the message has file:line.
     """
     file = find_path_file(name_or_path)
+    return parse_path_file(_read(file), file)
+
+
+def parse_path_file(content: str, file: Path) -> PathFile:
+    """Take the text of a path file.
+
+    Args:
+        content: of the file.
+        file: where from, for mistakes; need not be there.
+
+    Raises:
+        UsageError: it has a mistake; the message has file:line.
+    """
     with _no_collection():
-        text = _read(file)
+        text = _parsed(content, file)
         try:
             spec = msgspec.convert(text.value, PathSpec)
         except msgspec.ValidationError as error:
@@ -164,16 +177,22 @@ def _mistake(file: Path, line: int, what: str, remedy: str) -> UsageError:
     return UsageError(f"{file}:{line}: {what}", value=str(file), remedy=remedy)
 
 
-def _read(file: Path) -> PathText:
-    """The values in a file, a mapping. Raises UsageError."""
+def _read(file: Path) -> str:
+    """Raises UsageError."""
     try:
         if file.stat().st_size > MAX_FILE_BYTES:
             raise _mistake(file, 1, f"is larger than {MAX_FILE_BYTES / 1e6:g} MB", "drive it in parts")
-        text = PathText(file.read_text("utf-8-sig"))
+        return file.read_text("utf-8-sig")
     except OSError as error:
         raise _mistake(file, 1, f"cannot be read ({error.strerror})", "check its permissions") from None
     except UnicodeDecodeError:
         raise _mistake(file, 1, "is not UTF-8 text", "save the file as UTF-8") from None
+
+
+def _parsed(content: str, file: Path) -> PathText:
+    """The values in the text of a file, a mapping. Raises UsageError."""
+    try:
+        text = PathText(content)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         what = error.problem if error.note else f"YAML: {error.problem or error.context}"

@@ -37,6 +37,16 @@ _METHODS: Final[tuple[tuple[Method, Function], ...]] = (
     (Method("station.path.read", "One of them.", (_NAME,), "path", Role.WATCH), paths.read_path),
     (
         Method(
+            "station.path.parse",
+            "The path in a path file that the page has.",
+            (Param("file", "string", "its name, for mistakes"), Param("lines", "list", "of YAML or JSON")),
+            "path",
+            Role.WATCH,
+        ),
+        paths.parse_path,
+    ),
+    (
+        Method(
             "station.path.write",
             "Keep a path.",
             (

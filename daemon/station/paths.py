@@ -22,7 +22,7 @@ from daemon.loops.odometry import Pose
 from daemon.runtime.path_building import PathBuilder
 from daemon.runtime.path_commands import converted
 from daemon.station.robots import Robot
-from profiles.path_file import PathSpec, PieceSpec, StartSpec, load_path_file
+from profiles.path_file import PathSpec, PieceSpec, StartSpec, load_path_file, parse_path_file
 from profiles.path_writing import path_lines
 
 PATHS: Final = "paths"
@@ -50,6 +50,15 @@ async def read_path(robot: Robot, params: dict[str, Any]) -> dict[str, Any]:
     """
     spec = await asyncio.to_thread(_read, _file(robot.folder / PATHS, params["name"]))
     return {"path": msgspec.to_builtins(spec)}
+
+
+async def parse_path(robot: Robot, params: dict[str, Any]) -> dict[str, Any]:
+    """The path in a path file that a page has. Raises UsageError, with the line of the mistake."""
+    lines = params["lines"]
+    if not all(isinstance(line, str) for line in lines):
+        raise UsageError("a line is no text", object="lines", remedy="send the lines of the file as strings")
+    file = await asyncio.to_thread(parse_path_file, "\n".join(lines), Path(params["file"]))
+    return {"path": msgspec.to_builtins(file.spec)}
 
 
 async def write_path(robot: Robot, params: dict[str, Any]) -> dict[str, Any]:

@@ -38,7 +38,7 @@ export function put(input, value) {
   if (box && !input.disabled && isWrong(input) && told === box.agreed) return;
   if (box) box.agreed = told;
   if (input.value !== told || isWrong(input)) input.value = told;
-  if (box) judge(input);
+  if (box) mark(input, "");
 }
 
 /** Take what stands in the box that somebody is writing in as if they had left it. */
@@ -57,7 +57,7 @@ export function putBack(element) {
   const wrong = wrongBoxes(element);
   for (const input of wrong) {
     input.value = boxes.get(input).agreed;
-    judge(input);
+    mark(input, "");
   }
   return wrong.length > 0;
 }
@@ -73,16 +73,16 @@ function isWrong(input) {
 /** A browser that takes nonsense for empty tells of no change: so this is asked for when the box is left, too. */
 function settle(input) {
   const box = boxes.get(input);
-  judge(input);
-  if (isWrong(input) || input.value === box.agreed) return;
+  const untouched = input.value === box.agreed && !input.validity.badInput;
+  const words = untouched ? "" : wordsAgainst(input);
+  mark(input, words);
+  if (untouched || words) return;
   box.agreed = input.value;
   box.change(input.value === "" ? null : input.valueAsNumber);
 }
 
-function judge(input) {
-  const { note, against } = boxes.get(input);
-  input.setCustomValidity(Number.isNaN(input.valueAsNumber) ? "" : against(input.valueAsNumber));
-  const words = wordsAgainst(input);
+function mark(input, words) {
+  const { note } = boxes.get(input);
   if (words === note.textContent) return;
   if (!note.isConnected) input.after(note);
   text(note, words);
@@ -91,11 +91,12 @@ function judge(input) {
   input.dispatchEvent(new Event("judged", { bubbles: true }));
 }
 
-function wordsAgainst({ validity, min, max, required, validationMessage }) {
+function wordsAgainst(input) {
+  const { validity, min, max, required, value, valueAsNumber } = input;
   const orEmpty = required ? "" : ", or leave it empty";
   if (validity.badInput) return "this is no number";
   if (validity.valueMissing) return "give a number";
   if (validity.rangeUnderflow) return `give at least ${min}${orEmpty}`;
   if (validity.rangeOverflow) return `give at most ${max}${orEmpty}`;
-  return validationMessage;
+  return value === "" ? "" : boxes.get(input).against(valueAsNumber);
 }

@@ -31,7 +31,7 @@ export class Following {
 
   #way(way) {
     const backward = way === "backwards";
-    const change = () => this.editor.set("exchanged", backward);
+    const change = () => this.editor.exchange(backward);
     const input = h("input", { type: "radio", name: "path-way", value: way, onchange: change });
     input.checked = !backward;
     return input;
@@ -138,7 +138,6 @@ export class Following {
     put(this.speed, "");
     this.speed_m_s = null;
     text(this.result, "");
-    this.editor.set("exchanged", false);
   }
 }
 

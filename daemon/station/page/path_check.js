@@ -55,6 +55,15 @@ export class PathCheck extends EventTarget {
     this.#timer = setTimeout(() => this.#ask(asked), PAUSE_MS);
   }
 
+  /** The verdict on the path as it is now, as soon as there is one. */
+  async settled() {
+    this.look();
+    while (this.verdict.kind === "asking") {
+      await new Promise((resolve) => this.addEventListener("change", resolve, { once: true }));
+    }
+    return this.verdict;
+  }
+
   /** Ask once more: the vehicle or its place is another one. */
   again() {
     this.#asked = "";

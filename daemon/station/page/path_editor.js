@@ -10,7 +10,7 @@ const MOST_STEPS = 200;
 const MOST_PIECES = 500;
 const NEW_LINE = { kind: "line", length_m: 1 };
 const NEW_ARC = { kind: "arc", radius_m: 1.5, arc_deg: 45 };
-const EMPTY = { description: "", start: null, entries: [] };
+const EMPTY = { description: "", start: null, entries: [], exchanged: false };
 let entriesMade = 0;
 
 const editors = new WeakMap();
@@ -46,7 +46,6 @@ class PathEditor extends EventTarget {
     super();
     this.#station = station;
     this.chosen = null;
-    this.exchanged = false;
     this.nextBackward = false;
     this.snaps = true;
     this.problem = null;
@@ -63,6 +62,11 @@ class PathEditor extends EventTarget {
 
   get description() {
     return this.#state.description;
+  }
+
+  /** Whether the path is driven backwards: forward and backward exchanged in all of it. */
+  get exchanged() {
+    return this.#state.exchanged;
   }
 
   get undoable() {
@@ -84,9 +88,13 @@ class PathEditor extends EventTarget {
 
   /** The path as drive.path takes it. */
   spec() {
-    const { description, start, entries } = this.#state;
-    const pieces = entries.map((entry, index) => asPiece(entry, index ? entries[index - 1].backward : false));
-    return { ...(description && { description }), ...(start && { start }), pieces };
+    return asSpec(this.#state);
+  }
+
+  /** The path as it would be driven, for a file: whoever drives that forwards does the same. */
+  drivenSpec() {
+    const { entries, exchanged, ...rest } = this.#state;
+    return asSpec({ ...rest, entries: entries.map((entry) => ({ ...entry, backward: entry.backward !== exchanged })) });
   }
 
   /** The pieces in the frame of the map, and where a next one would begin. */
@@ -143,7 +151,7 @@ class PathEditor extends EventTarget {
     this.dispatchEvent(new Event("change"));
   }
 
-  /** Set a property that is no part of the path: chosen, exchanged, nextBackward, snaps, problem. */
+  /** Set a property that is no part of the path: chosen, nextBackward, snaps, problem. */
   set(name, value) {
     if (this[name] === value) return;
     this[name] = value;
@@ -151,7 +159,13 @@ class PathEditor extends EventTarget {
   }
 
   clear() {
-    this.edit((state) => Object.assign(state, structuredClone(EMPTY)));
+    const { exchanged } = this;
+    this.edit((state) => Object.assign(state, structuredClone(EMPTY), { exchanged }));
+  }
+
+  /** Have the path driven backwards, or as it is written. */
+  exchange(exchanged) {
+    this.edit((state) => Object.assign(state, { exchanged }));
   }
 
   #forget() {
@@ -159,14 +173,16 @@ class PathEditor extends EventTarget {
     this.#show(EMPTY);
   }
 
-  /** Take over a path of any form; points and waypoints become lines and arcs that join.
+  /** Take over a path of any form, to be driven as it is written; points and waypoints become lines and arcs that join.
    *  Returns what is lost by that, for people, or "". */
   load(path) {
     const { pieces, broken, gap_m, kink_rad } = build(path, this.here(), { lead_m: this.lead_m });
     const entries = pieces.slice(0, MOST_PIECES).map((piece) => made(asEntry(piece)));
     const { description = "", start = null } = path;
     this.chosen = null;
-    this.edit((state) => Object.assign(state, { description, start: start && fullStart(start), entries }));
+    this.edit((state) =>
+      Object.assign(state, { description, start: start && fullStart(start), entries, exchanged: false }),
+    );
     if (pieces.length > MOST_PIECES) return `only its first ${MOST_PIECES} pieces are here`;
     if (broken !== null) return `piece ${broken} is none, so the pieces from there on are left out`;
     const joins = gap_m <= MAX_GAP_M && kink_rad <= MAX_KINK_RAD;
@@ -273,6 +289,11 @@ function made(entry) {
 
 function fullStart({ x_m = 0, y_m = 0, heading_deg = 0 }) {
   return { x_m, y_m, heading_deg };
+}
+
+function asSpec({ description, start, entries }) {
+  const pieces = entries.map((entry, index) => asPiece(entry, index ? entries[index - 1].backward : false));
+  return { ...(description && { description }), ...(start && { start }), pieces };
 }
 
 function asPiece({ kind, length_m, radius_m, arc_deg, backward }, before) {

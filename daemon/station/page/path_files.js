@@ -4,6 +4,10 @@ import { allow, h, text } from "./dom.js";
 import { settleWriting } from "./fields.js";
 import { Question } from "./question.js";
 
+/** What fits into one message to the station. */
+const MOST_BYTES = 60_000;
+const TOO_LONG = "put it into the robot's folder of paths, or drive it by `canhelm drive path`";
+const EXCHANGED = "Save and Export write the path as it is driven: backwards.";
 const NAME = "[A-Za-z0-9][A-Za-z0-9_\\-]{0,59}";
 
 /** The controls above the editor. */
@@ -14,7 +18,7 @@ export class PathFiles {
     [this.station, this.editor, this.check] = [station, editor, check];
     this.select = h("select", { id: "path-kept", onchange: () => this.show() });
     this.name = h("input", { type: "text", pattern: NAME, maxlength: 60, oninput: () => this.show() });
-    this.file = h("input", { type: "file", accept: ".json", hidden: true, onchange: () => this.#import() });
+    this.file = h("input", { type: "file", accept: ".yaml,.yml,.json", hidden: true, onchange: () => this.#import() });
     this.question = new Question("Confirm");
     this.buttons = {
       load: this.#button("Load", () => this.#load()),
@@ -24,6 +28,7 @@ export class PathFiles {
       exporting: this.#button("Export", () => this.#export()),
       record: this.#button("Record a drive", () => this.#record()),
     };
+    this.direction = h("p", { class: "reason", role: "status" });
     this.told = h("p", { class: "reason", role: "status" });
     this.element = this.#fieldset();
     station.on("connected", () => this.#connected());
@@ -44,6 +49,7 @@ export class PathFiles {
       h("legend", {}, "Kept paths"),
       row(h("label", { class: "field" }, "Path", this.select), load, remove),
       row(h("label", { class: "field" }, "Name", this.name), save, importing, exporting, this.file),
+      this.direction,
       this.question.element,
       row(record),
       this.told,
@@ -59,6 +65,8 @@ export class PathFiles {
     allow(buttons.remove, chosen ?? station.cannot("station.path.delete"));
     allow(buttons.save, empty ?? named ?? station.cannot("station.path.write"));
     allow(buttons.exporting, empty);
+    allow(buttons.importing, station.cannot("station.path.parse"));
+    text(this.direction, editor.exchanged && editor.entries.length ? EXCHANGED : "");
     allow(buttons.record, station.cannot("station.record.start"));
     text(buttons.record, this.#recording ? "End the recording" : "Record a drive");
   }
@@ -105,9 +113,10 @@ export class PathFiles {
   }
 
   #take(path, told) {
+    const turned = this.editor.exchanged ? " It is driven as it is written: forwards is chosen again." : "";
     const lost = this.editor.load(path);
     if (lost) this.station.say(`Path: ${lost}`, "warning", "look at it on the map before it is driven");
-    text(this.told, told);
+    text(this.told, `${told}${turned}`);
   }
 
   #save() {
@@ -121,10 +130,12 @@ export class PathFiles {
 
   async #write(name, replace) {
     if (this.#unwritable()) return;
-    const params = { name, path: this.editor.spec(), replace };
+    const how = this.editor.exchanged ? ", as it is driven backwards" : "";
+    const params = { name, path: this.editor.drivenSpec(), replace };
     if (!(await this.station.attempt(this.station.call("station.path.write", params), `Path ${name}`))) return;
-    text(this.told, `${name} is saved.`);
+    text(this.told, `${name} is saved${how}.`);
     this.#list(name);
+    this.#warn(`${name} is saved`);
   }
 
   #delete() {
@@ -143,21 +154,21 @@ export class PathFiles {
   async #import() {
     const [file] = this.file.files;
     this.file.value = "";
-    if (!file) return;
-    try {
-      this.#take(JSON.parse(await file.text()), `${file.name} is in the editor.`);
-      this.name.value = file.name.replace(/\.\w+$/, "").replace(/[^A-Za-z0-9_-]/g, "-");
-    } catch {
-      const remedy = "give a path as JSON, such as Export writes it; YAML files go into the robot's folder of paths";
-      this.station.say(`${file.name} is no path`, "error", remedy);
-    }
+    if (!file) return null;
+    const content = await shortText(file);
+    if (content === null) return this.station.say(`${file.name} is too long for a page`, "error", TOO_LONG);
+    const call = this.station.call("station.path.parse", { file: file.name, lines: content.split("\n") });
+    const answer = await this.station.attempt(call, "Import");
+    if (!answer) return null;
+    this.name.value = file.name.replace(/\.\w+$/, "").replace(/[^A-Za-z0-9_-]/g, "-");
+    return this.#take(answer.path, `${file.name} is in the editor.`);
   }
 
   /** JSON is YAML, too: `canhelm drive path` reads it. */
   #export() {
     settleWriting();
     if (this.#unwritable()) return;
-    const content = `${JSON.stringify(this.editor.spec(), null, 1)}\n`;
+    const content = `${JSON.stringify(this.editor.drivenSpec(), null, 1)}\n`;
     const href = URL.createObjectURL(new Blob([content], { type: "application/json" }));
     h("a", { href, download: `${this.name.value || "path"}.json` }).click();
     setTimeout(() => URL.revokeObjectURL(href), 1000);
@@ -186,11 +197,27 @@ export class PathFiles {
     const call = this.station.call("station.record.stop", { keep: false }, { timeout_ms: 60_000 });
     const answer = await this.station.attempt(call, "Recording");
     if (!answer) return text(this.told, "Nothing was recorded.");
-    const { path, length_m, pieces } = answer;
-    return this.#take(path, `The recorded way is in the editor: ${length_m.toFixed(2)} m, ${pieces} pieces.`);
+    const { path, length_m, pieces, trouble } = answer;
+    if (trouble) this.station.say(`The recorded way is not whole: ${trouble}`, "warning");
+    this.#take(path, `The recorded way is in the editor: ${length_m.toFixed(2)} m, ${pieces} pieces.`);
+    return this.#warn("The recorded way is in the editor");
+  }
+
+  /** Tell of a piece that this vehicle cannot drive, whatever was done with the path. */
+  async #warn(done) {
+    const { kind, piece, message, remedy } = await this.check.settled();
+    if (kind !== "bad" || piece === null) return;
+    this.station.say(`${done}, but it cannot be driven: ${message}`, "warning", remedy);
   }
 }
 
 function titled(name, length_m) {
   return length_m == null ? name : `${name} (${length_m.toFixed(1)} m)`;
+}
+
+/** The text of a file; null where it is longer than one message to the station may be. */
+async function shortText(file) {
+  if (file.size > MOST_BYTES) return null;
+  const content = await file.text();
+  return new Blob([JSON.stringify(content.split("\n"))]).size > MOST_BYTES ? null : content;
 }

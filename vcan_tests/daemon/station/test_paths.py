@@ -181,3 +181,25 @@ async def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(NotReady, match="paths cannot be kept"):
         await write(Robot("max2d", tmp_path / "max2d.sock", tmp_path / "file"), "corner")
+
+
+async def test_a_path_file_of_a_page_is_read_as_one_of_this_machine(robot: Robot) -> None:
+    lines = ["# fitted", "pieces:", "  - {line_m: 1.5}", "  - {drive: backward, line_m: 2}", ""]
+    told = await paths.parse_path(robot, {"file": "way.yaml", "lines": lines})
+    assert told == {"path": {"pieces": [{"line_m": 1.5}, {"line_m": 2.0, "drive": "backward"}]}}
+
+
+@pytest.mark.parametrize(
+    ("lines", "told"),
+    [
+        (["pieces:", "  - {line_m: 1}", "  - {lime_m: 1}"], r"way\.yaml:3: pieces\[1\]"),
+        (["pieces: [", "{line_m: 1"], r"way\.yaml:3: YAML"),
+        ([], r"way\.yaml:1: the path is empty"),
+        (["pieces: [{line_m: 1}]", 7], "a line is no text"),
+    ],
+)
+async def test_a_mistake_in_a_path_file_of_a_page_is_told_with_its_line(
+    robot: Robot, lines: list[Any], told: str
+) -> None:
+    with pytest.raises(UsageError, match=told):
+        await paths.parse_path(robot, {"file": "way.yaml", "lines": lines})
