@@ -88,8 +88,8 @@ $(VENV)/bin/pip:
 	@$(PYTHON) -m venv $(VENV)
 
 $(VENV)/.stamp-demo: pyproject.toml | $(VENV)/bin/pip
-	@echo "installing canhelm and what its pictures need into $(VENV)"
-	@$(PIP) --editable '.[plot]'
+	@echo "installing canhelm and what its pictures and its control station need into $(VENV)"
+	@$(PIP) --editable '.[plot,web]'
 	@touch $@
 
 $(VENV)/.stamp-test: pyproject.toml | $(VENV)/bin/pip

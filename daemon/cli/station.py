@@ -6,6 +6,7 @@ import asyncio
 import importlib.util
 import os
 import signal
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -40,7 +41,8 @@ def station(
         tokens: File of lines, each a role and a token that gives it; only its owner may read it (docs/station.md).
     """
     if importlib.util.find_spec("aiohttp") is None:
-        raise UsageError("no control station: aiohttp is missing", remedy="pip install 'canhelm[web]'")
+        remedy = f"{sys.executable} -m pip install 'canhelm[web]'"
+        raise UsageError("no control station: aiohttp is missing", remedy=remedy)
     from daemon.api.tokens import load_tokens
     from daemon.station.guard import is_loopback
     from daemon.station.robots import Robots

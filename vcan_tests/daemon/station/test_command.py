@@ -89,7 +89,7 @@ def test_without_its_extra_it_says_what_to_install(
 ) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     assert run("station") == 2
-    assert "pip install 'canhelm[web]'" in capsys.readouterr().err
+    assert f"{sys.executable} -m pip install 'canhelm[web]'" in capsys.readouterr().err
 
 
 def test_the_other_commands_do_without_aiohttp() -> None:
