@@ -238,7 +238,7 @@ def test_a_kind_of_fault_is_asked_for_what_it_takes_alone(operator: Operator, ro
     operator.page.select_option(f"{form} select >> nth=1", "front")
     operator.page.fill(f"{form} input >> nth=0", "1")
     operator.page.click("text=Set this fault")
-    operator.sees(f"{SIMULATION} table", "encoder_jump angle_deg 1")
+    operator.sees(f"{SIMULATION} table:has-text('Faults that were set')", "encoder_jump\\s+angle_deg 1")
     (fault,) = faults(robot)
     assert (fault["kind"], fault["part"], fault["angle_deg"]) == ("encoder_jump", "front", 1.0)
 
