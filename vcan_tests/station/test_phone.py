@@ -44,14 +44,13 @@ def test_notices_cover_neither_stop_nor_what_drives_and_can_be_closed(holder: Op
         assert (selector, holder.page.evaluate(COVERED, selector)) == (selector, False)
     for left in (2, 1, 0):
         holder.page.tap("#notices .close >> nth=0")
-        assert holder.page.locator(".notice").count() == left
+        holder.comes_to(holder.page.locator(".notice").count, left)
 
 
 def test_another_panel_begins_at_its_top(meet: Meet, robot: Robot) -> None:
     operator = meet(**PHONE)
     operator.open(robot.name)
     operator.go_to("devices")
-    operator.page.evaluate("() => scrollTo(0, 600)")
-    operator.until(lambda: operator.page.evaluate("() => scrollY > 300"), lambda: "it does not scroll")
+    operator.comes_to(lambda: operator.page.evaluate("() => (scrollTo(0, 600), scrollY > 300)"), True)
     operator.go_to("simulation")
-    operator.until(lambda: operator.page.evaluate("() => scrollY === 0"), lambda: "it begins in its middle")
+    operator.comes_to(lambda: operator.page.evaluate("() => scrollY"), 0)
