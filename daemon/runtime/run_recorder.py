@@ -83,6 +83,7 @@ class RunRecorder:
         self._trouble = trouble or ComputerTrouble()
         self._recordings: list[Recording] = []
         self._last: Path | None = None
+        self._unended: set[int] = set()
         self._given_up = False
 
     def start(self) -> None:
@@ -109,9 +110,14 @@ class RunRecorder:
         self._disk.close()
 
     def status(self) -> dict[str, Any]:
-        """The runs for ``status``."""
-        last = self._last.name if self._last else None
-        return {"folder": str(self._store.folder), "last": last, "message": self.message, "remedy": self.remedy}
+        """The runs for ``status``; one is under way until it is written how it ended."""
+        return {
+            "folder": str(self._store.folder),
+            "last": self._last.name if self._last else None,
+            "under_way": sorted(self._unended),
+            "message": self.message,
+            "remedy": self.remedy,
+        }
 
     # --- guarded: a defect of the recording is no reason to stop a robot ----------------------------------------
 
@@ -140,6 +146,7 @@ class RunRecorder:
     def _give_up(self) -> None:
         self._given_up = True
         self._recordings.clear()
+        self._unended.clear()
         self.message = "the recording of runs failed inside the daemon: report it with the log"
         self.remedy = "canhelm doctor --bundle FILE packs what a report needs"
 
@@ -160,9 +167,10 @@ class RunRecorder:
         folder = self._store.begin()
         (folder / PROFILE).write_bytes(self._profile_yaml)
         (folder / DRIVES).write_bytes(make_yaml(drives))
-        (folder / FACTS).write_bytes(make_yaml(facts))
         (folder / CYCLES).write_bytes(self._rows.head)
         recording.folder = self._last = folder
+        self._unended.add(int(folder.name))
+        (folder / FACTS).write_bytes(make_yaml(facts))
 
     def _facts(self, recording: Recording) -> dict[str, Any]:
         motion = recording.motion
@@ -207,10 +215,14 @@ class RunRecorder:
         }
         self._disk.do(partial(self._write_facts, recording, facts))
 
-    @staticmethod
-    def _write_facts(recording: Recording, facts: dict[str, Any]) -> None:
-        if recording.folder is not None:
+    def _write_facts(self, recording: Recording, facts: dict[str, Any]) -> None:
+        """In the disk's thread."""
+        if recording.folder is None:
+            return
+        try:
             (recording.folder / FACTS).write_bytes(make_yaml(facts))
+        finally:
+            self._unended.discard(int(recording.folder.name))
 
     # --- gathering ---------------------------------------------------------------------------------------------
 

@@ -28,9 +28,19 @@ _ONE_AT_A_TIME: Final = asyncio.Semaphore(1)
 
 
 async def list_runs(robot: Robot, params: dict[str, Any]) -> dict[str, Any]:
-    """The newest runs, oldest first. Raises ConfigError where this user may not read them."""
+    """The newest runs, oldest first. Raises ConfigError where this user may not read them.
+
+    What has not ended is under way where the daemon says so. It is read again after that has been asked, as it may
+    have ended meanwhile.
+    """
     folder = await _folder(robot)
-    return {"runs": await asyncio.to_thread(_list, folder, robot.name) if folder else []}
+    if folder is None:
+        return {"runs": []}
+    runs = await asyncio.to_thread(_list, folder, robot.name)
+    if not all(run["ended"] for run in runs):
+        under_way = await _under_way(robot)
+        runs = await asyncio.to_thread(_list_again, folder, runs, under_way)
+    return {"runs": runs}
 
 
 async def run_file(robot: Robot, run: str, name: str) -> Path:
@@ -97,11 +107,26 @@ async def _draw(folder: Path, picture: Path) -> None:
 async def _folder(robot: Robot) -> Path | None:
     """Where the daemon keeps its runs, as it tells; without one where it would; None where it keeps none."""
     try:
-        async with asyncio.timeout(2.0), Client(robot.socket) as client:
-            told = (await client.status())["runs"]
+        told = await _told_of_runs(robot)
     except (DaemonNotRunning, TimeoutError):
         return robot.folder / RUNS
     return Path(told["folder"]) if told else None
+
+
+async def _under_way(robot: Robot) -> frozenset[int]:
+    """The runs that the daemon writes now; without a daemon there are none."""
+    try:
+        told = await _told_of_runs(robot)
+    except (DaemonNotRunning, TimeoutError):
+        return frozenset()
+    return frozenset(told["under_way"] if told else ())
+
+
+async def _told_of_runs(robot: Robot) -> dict[str, Any] | None:
+    """What the daemon says of its runs; None where it keeps none. Raises DaemonNotRunning, TimeoutError."""
+    async with asyncio.timeout(2.0), Client(robot.socket) as client:
+        told: dict[str, Any] | None = (await client.status())["runs"]
+        return told
 
 
 async def _run_folder(robot: Robot, run: str) -> Path:
@@ -120,6 +145,18 @@ async def _run_folder(robot: Robot, run: str) -> Path:
 def _list(folder: Path, robot: str) -> list[dict[str, Any]]:
     runs = [_told(path) for path in _folders(folder)[-MAX_LISTED:]]
     return [run for run in runs if run.pop("robot") == robot]
+
+
+def _list_again(folder: Path, runs: list[dict[str, Any]], under_way: frozenset[int]) -> list[dict[str, Any]]:
+    """The same runs, with those marked that are under way, and how others have ended by now."""
+    return [run if run["ended"] else _again(folder, run, under_way) for run in runs]
+
+
+def _again(folder: Path, run: dict[str, Any], under_way: frozenset[int]) -> dict[str, Any]:
+    if run["run"] in under_way:
+        return {**run, "under_way": True}
+    now = _told(folder / f"{run['run']:04d}")
+    return {key: value for key, value in now.items() if key != "robot"}
 
 
 def _find(folder: Path, robot: str, number: int) -> Path | None:
@@ -144,10 +181,12 @@ def _told(path: Path) -> dict[str, Any]:
     return {
         "robot": run.robot,
         "run": run.number,
-        "begun": run.when,
+        "begun": run.begun,
+        "struck": run.facts.get("struck"),
         "method": f"fault in {motion or 'no motion'}" if run.facts.get("kind") == FAULT else motion,
         "ended": run.facts.get("ended"),
         "message": run.facts.get("message", ""),
+        "under_way": False,
         "duration_s": run.facts.get("duration_s"),
         "files": _files(path),
     }

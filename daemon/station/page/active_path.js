@@ -3,23 +3,31 @@
 import { build } from "./path_geometry.js";
 
 /**
- * Attribute `pieces`: of the path followed now, in the frame of the map; null where none is followed.
- * Calls `changed` when that is another one.
+ * Attributes: `pieces` of the path followed now, in the frame of the map, null where none is followed; `last`, of the
+ * one that was followed before, where it was, until the next one or `forget`. Calls `changed` when one is another.
  */
 export class ActivePath {
   #station;
   #motion = null;
 
   constructor(station, changed) {
-    [this.#station, this.changed, this.pieces] = [station, changed, null];
+    [this.#station, this.changed, this.pieces, this.last] = [station, changed, null, null];
     station.on("status", ({ vehicle }) => this.#look(vehicle?.following ?? null));
-    station.on("robot", () => this.#look(null));
+    station.on("robot", () => this.forget());
+  }
+
+  /** Show no path any more, until the next one is followed. */
+  forget() {
+    this.#look(null);
+    this.last = null;
+    this.changed();
   }
 
   #look(following) {
     const motion = following?.motion ?? null;
     if (motion === this.#motion) return;
     this.#motion = motion;
+    this.last = motion === null ? this.pieces : null;
     this.#show(null);
     if (motion !== null) this.#ask(motion);
   }

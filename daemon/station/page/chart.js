@@ -91,7 +91,7 @@ export class Chart {
   #tell(values) {
     const withUnit = (value) => `${number(value, this.digits)} ${this.unit}`;
     const told = this.names.map((name, index) => `${name} ${withUnit(values[index])}`.trim());
-    if (this.#limit !== null) told.push(`limit ${withUnit(this.#limit)}`);
+    if (this.#limit !== null) told.push(`limit ${withUnit(this.#limit)}${this.#limitIsFar() ? ", outside the chart" : ""}`);
     text(this.newest, told.join(", "));
     attribute(this.canvas, "aria-label", `${this.title} over the last ${SPAN_S} s; its newest values stand above`);
   }
@@ -105,7 +105,7 @@ export class Chart {
     context.font = font(11);
     const frame = this.#frame(width, height);
     this.#drawAxes(context, colours, frame);
-    if (this.#limit !== null) this.#drawLimits(context, colours, frame);
+    if (this.#limit !== null && !this.#limitIsFar()) this.#drawLimits(context, colours, frame);
     const now_s = this.#now_s;
     if (now_s === null) return;
     this.names.forEach((_, series) => this.#drawSeries(context, colours, frame, series, now_s - SPAN_S));
@@ -120,6 +120,11 @@ export class Chart {
     const x = (time_s) => left + (right - left) * (time_s - from_s) / SPAN_S;
     const y = (value) => (top + bottom) / 2 - (bottom - top) / 2 * value / most;
     return { left, right, top, bottom, most, from_s, x, y };
+  }
+
+  /** Whether no value in sight has come near the limit, so that the axis does not reach to it. */
+  #limitIsFar() {
+    return this.#largest(this.#now_s - SPAN_S) < this.#limit;
   }
 
   /** The largest value in sight; a limit counts once a value has come near it. */
@@ -149,20 +154,19 @@ export class Chart {
     }
   }
 
-  /** Both limits as dashed lines; those beyond the axis at its ends, with arrows outwards. */
-  #drawLimits(context, colours, { left, right, top, bottom, most, y }) {
+  /** Both limits as dashed lines. */
+  #drawLimits(context, colours, { left, right, y }) {
     const name = `limit ${number(this.#limit, this.digits)} ${this.unit}`;
-    const beyond = this.#limit > most;
     [context.strokeStyle, context.fillStyle, context.lineWidth] = [colours.bad, colours.bad, 1.5];
     context.textAlign = "left";
     context.setLineDash([7, 4]);
-    const [high, low] = beyond ? [top, bottom] : [y(this.#limit), y(-this.#limit)];
+    const [high, low] = [y(this.#limit), y(-this.#limit)];
     for (const at of [high, low]) rule(context, [left, at], [right, at]);
     context.setLineDash([]);
     context.textBaseline = "top";
-    context.fillText(beyond ? `▲ ${name}` : name, left + 4, high + 3);
+    context.fillText(name, left + 4, high + 3);
     context.textBaseline = "bottom";
-    context.fillText(beyond ? `▼ ${name}` : name, left + 4, low - 2);
+    context.fillText(name, left + 4, low - 2);
   }
 
   #drawLegend(context, colours, { left, top }) {

@@ -4,6 +4,7 @@ import { allow, h, number, text } from "./dom.js";
 import { field, put, putBack, settleWriting } from "./fields.js";
 
 const METHOD = "drive.path";
+const ANEW = "The path in the editor begins anew where the vehicle is now; the one it drove stays on the map as a thin line.";
 const HINT =
   "Backwards exchanges forward and backward in the whole path. The page holds the drive: hide or close it, and the "
   + "vehicle comes to rest.";
@@ -78,7 +79,8 @@ export class Following {
     this.show();
     const told = await this.station.move(METHOD, this.check().params()).then(inWords, (error) => this.#tellEnd(error));
     this.#driving = false;
-    text(this.result, robot === this.station.robot ? told : "");
+    const parts = [told, this.editor.start ? "" : ANEW];
+    text(this.result, robot === this.station.robot ? parts.join(" ").trim() : "");
     this.show();
   }
 

@@ -146,6 +146,7 @@ class MapPanel {
 
   #clearTrail() {
     this.#trail.clear();
+    if (!this.active.pieces) this.active.forget();
     this.#changed();
   }
 
@@ -233,7 +234,9 @@ class MapPanel {
   }
 
   #drawWays(context, colours) {
-    if (this.active.pieces) drawPieces(context, this.#view, this.active.pieces, colours.good, 4);
+    const { pieces, last } = this.active;
+    if (last) drawPieces(context, this.#view, last, colours.good, 1.5);
+    if (pieces) drawPieces(context, this.#view, pieces, colours.good, 4);
     else this.#drawEditor(context, colours);
     [context.strokeStyle, context.lineWidth] = [colours.series[3], 2];
     this.#trail.draw(context, this.#view);
@@ -260,7 +263,7 @@ class MapPanel {
     if (now_ms - this.#told_ms < TOLD_EACH_MS) return;
     this.#told_ms = now_ms;
     const pose = placeOf(vehicle);
-    if (pose) attribute(this.canvas, "aria-label", `Map: ${inWords(pose, vehicle.following, this.editor)}`);
+    if (pose) attribute(this.canvas, "aria-label", `Map: ${inWords(pose, vehicle.following, this.editor, this.active.last)}`);
   }
 }
 
@@ -268,9 +271,12 @@ function placeOf(vehicle) {
   return vehicle?.pose ?? vehicle?.odometry ?? null;
 }
 
-function inWords({ x_m, y_m, yaw_deg }, following, editor) {
+function inWords({ x_m, y_m, yaw_deg }, following, editor, last) {
   const where = `vehicle at x ${number(x_m)} m, y ${number(y_m)} m, heading ${number(yaw_deg, 0)} degrees`;
   if (following) return `${where}, following a path, ${number(Math.abs(following.error_m))} m from it`;
-  const found = nearest(editor.built().pieces, x_m, y_m);
-  return found ? `${where}, ${number(found.distance_m)} m from the path in the editor` : where;
+  const from = (pieces, name) => {
+    const found = nearest(pieces ?? [], x_m, y_m);
+    return found ? `, ${number(found.distance_m)} m from the ${name}` : "";
+  };
+  return `${where}${from(editor.built().pieces, "path in the editor")}${from(last, "path driven last")}`;
 }

@@ -3,7 +3,9 @@
 import { allow, attribute, h, number, redraw, text } from "./dom.js";
 import { Rows, table } from "./rows.js";
 
-const HEADS = ["Run", "Begun", "What", "How it ended", "Duration", "Files"];
+const HEADS = ["Run", "When", "What", "How it ended", "Duration", "Files"];
+const CLOCK = { dateStyle: "medium", timeStyle: "medium", hourCycle: "h23" };
+const WORDLESS = "ended without a word: its daemon was killed, or could not write";
 const WANTED = "run-wanted";
 
 /** Open the newest run as soon as the panel is shown and has read which one that is. */
@@ -84,17 +86,18 @@ class RunsPanel {
   #row(run) {
     const act = { type: "button", "aria-label": `Open run ${run.run}`, onclick: () => this.#open(run) };
     const open = h("button", act, run.run);
-    const [begun, method, ended, files] = [h("td"), h("td"), h("td"), h("td")];
-    const cells = { begun, method, ended, duration: h("td", { class: "number" }), files };
+    const [when, method, ended, files] = [h("td"), h("td"), h("td"), h("td")];
+    const cells = { when, method, ended, duration: h("td", { class: "number" }), files };
     const element = h("tr", {}, h("th", { scope: "row" }, open), ...Object.values(cells));
     return { element, show: (now) => this.#fill(element, cells, now) };
   }
 
-  #fill(element, cells, { run, begun, method, ended, message, duration_s, files }) {
+  #fill(element, cells, told) {
+    const { run, method, ended, message, duration_s, files } = told;
     attribute(element, "data-chosen", run === this.#chosen);
-    text(cells.begun, begun ? new Date(begun).toLocaleString() : "–");
+    text(cells.when, when(told));
     text(cells.method, method);
-    text(cells.ended, [ended ?? "under way", message].filter(Boolean).join(": "));
+    text(cells.ended, [ended ?? (told.under_way ? "under way" : WORDLESS), message].filter(Boolean).join(": "));
     text(cells.duration, duration_s == null ? "–" : `${number(duration_s, 1)} s`);
     if (cells.files.childElementCount !== files.length) cells.files.replaceChildren(this.#links(run, files));
   }
@@ -138,4 +141,11 @@ class RunsPanel {
     this.opened.hidden = true;
     attribute(this.picture, "src", null);
   }
+}
+
+/** What a run's time is: a motion's begin, or the moment of a fault, which is the end of what is in its run. */
+function when({ begun, struck }) {
+  const time = struck ?? begun;
+  if (!time) return "–";
+  return `${struck ? "fault struck" : "begun"} ${new Date(time).toLocaleString(undefined, CLOCK)}`;
 }

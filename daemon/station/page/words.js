@@ -1,6 +1,6 @@
 /** Words of the daemon as this page says them, and times for people. */
 
-const CLOCK = new Intl.DateTimeFormat([], { hour: "2-digit", minute: "2-digit", second: "2-digit", hour12: false });
+const CLOCK = new Intl.DateTimeFormat([], { hour: "2-digit", minute: "2-digit", second: "2-digit", hourCycle: "h23" });
 
 /** A time of day, of milliseconds since 1970. */
 export function clockTime(at_ms) {

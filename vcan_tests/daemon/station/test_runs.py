@@ -48,18 +48,37 @@ async def test_a_run_is_listed_with_what_people_ask_for_first(robot: Robot) -> N
         {
             "run": 3,
             "begun": "2026-11-20T08:00:03.000+00:00",
+            "struck": None,
             "method": "drive.turn",
             "ended": "done",
             "message": "",
+            "under_way": False,
             "duration_s": 1.0,
             "files": ["cycles.csv", "profile.yaml", "run.yaml"],
         }
     ]
 
 
-async def test_what_a_fault_left_says_so(robot: Robot) -> None:
-    keep(robot, 1, kind="fault", motion="drive.path")
-    assert [run["method"] for run in await listed(robot)] == ["fault in drive.path"]
+async def test_what_a_fault_left_says_so_and_when_it_struck(robot: Robot) -> None:
+    struck = "2026-11-20T08:01:01.000+00:00"
+    keep(robot, 1, kind="fault", motion="drive.path", struck=struck)
+    (run,) = await listed(robot)
+    assert (run["method"], run["struck"]) == ("fault in drive.path", struck)
+    assert run["begun"] == "2026-11-20T08:00:01.000+00:00"
+
+
+async def test_a_run_that_no_daemon_writes_any_more_is_not_under_way(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    keep(robot, 1, ended=None)
+    keep(robot, 2, ended=None)
+
+    async def told(robot: Robot) -> dict[str, Any]:
+        return {"folder": str(robot.folder / "runs"), "under_way": [2]}
+
+    assert [run["under_way"] for run in await listed(robot)] == [False, False]
+    monkeypatch.setattr(runs, "_told_of_runs", told)
+    assert [run["under_way"] for run in await listed(robot)] == [False, True]
 
 
 async def test_runs_of_other_robots_are_neither_listed_nor_opened(robot: Robot) -> None:
