@@ -12,6 +12,7 @@ const HINT =
 /** The controls under the editor. Attribute `speed_m_s`: what is asked for; null for as fast as the vehicle may. */
 export class Following {
   #driving = false;
+  #moved = false;
 
   constructor(station, editor, check) {
     [this.station, this.editor, this.check, this.speed_m_s] = [station, editor, check, null];
@@ -74,12 +75,12 @@ export class Following {
     settleWriting();
     if (this.#against()) return;
     const { robot } = this.station;
-    this.#driving = true;
+    [this.#driving, this.#moved] = [true, false];
     text(this.result, "");
     this.show();
     const told = await this.station.move(METHOD, this.check().params()).then(inWords, (error) => this.#tellEnd(error));
     this.#driving = false;
-    const parts = [told, this.editor.start ? "" : ANEW];
+    const parts = [told, this.#moved && !this.editor.start ? ANEW : ""];
     text(this.result, robot === this.station.robot ? parts.join(" ").trim() : "");
     this.show();
   }
@@ -127,6 +128,7 @@ export class Following {
   #showProgress(following) {
     this.progress.hidden = !following;
     if (!following) return;
+    this.#moved = true;
     const { progress_m, length_m, error_m, backward } = following;
     const share = length_m > 0 ? Math.min(1, Math.max(0, progress_m / length_m)) : 0;
     if (Math.abs(this.bar.value - share) > 0.002) this.bar.value = share;
