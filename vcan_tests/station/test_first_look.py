@@ -22,13 +22,13 @@ def station_with(fleet: Fleet, name: str, *options: str) -> Iterator[Station]:
     station.end()
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def lonely(fleet: Fleet) -> Iterator[Station]:
     """A station that offers only a robot that nobody has started."""
     yield from station_with(fleet, "lonely", "--robot", "nosuch")
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def guarded(fleet: Fleet) -> Iterator[Station]:
     """A station that wants tokens."""
     tokens = fleet.folder / "look.tokens"
