@@ -9,13 +9,19 @@ import pytest
 
 from vcan_tests.station.browser import CONNECTED, Operator
 from vcan_tests.station.conftest import Meet
-from vcan_tests.station.processes import REST_M_S, UNHELD_S, Fleet, Robot, speeds
+from vcan_tests.station.processes import REST_M_S, UNHELD_S, Fleet, Robot, Status, speeds
+from vcan_tests.station.stick import drives
 from vcan_tests.station.wire import Wire, wire_to
 
 pytestmark = pytest.mark.station
 
 LOST = (r"WebSocket connection", r"^failed: ", r"console error: Failed to load resource", r"^50\d: ")
 """What a browser itself tells of a connection that is lost."""
+
+
+def moving(status: Status) -> bool:
+    """Whether every wheel turns."""
+    return min(speeds(status)) > 0.1
 
 
 @pytest.fixture
@@ -31,9 +37,7 @@ def driver(meet: Meet, wire: Wire, robot: Robot) -> Operator:
     operator = meet(wire.url)
     operator.expects(*LOST)
     operator.open(robot.name)
-    operator.take_seat()
-    operator.pulls(".stick", right=0.0, up=0.6)
-    robot.comes_to(lambda status: min(speeds(status)) > 0.1)
+    drives(operator, robot, moving)
     return operator
 
 
@@ -105,9 +109,7 @@ def test_after_the_network_is_back_the_robot_drives_when_the_stick_is_let_go_of_
     wire.mend()
     driver.sees("#connection", CONNECTED)
     driver.page.mouse.up()
-    driver.take_seat()
-    driver.pulls(".stick", right=0.0, up=0.6)
-    robot.comes_to(lambda status: min(speeds(status)) > 0.1)
+    drives(driver, robot, moving)
     driver.page.mouse.up()
 
 

@@ -6,19 +6,23 @@ import pytest
 
 from vcan_tests.station.browser import Operator
 from vcan_tests.station.conftest import Meet
-from vcan_tests.station.processes import UNHELD_S, Robot, speeds
+from vcan_tests.station.processes import UNHELD_S, Robot, Status, speeds
+from vcan_tests.station.stick import drives
 
 pytestmark = pytest.mark.station
 
 MOVING_M_S = 0.1
 
 
+def moving(status: Status) -> bool:
+    """Whether every wheel turns."""
+    return min(speeds(status)) > MOVING_M_S
+
+
 @pytest.fixture
 def first(operator: Operator, robot: Robot) -> Operator:
     """Somebody who drives by the stick, and holds it."""
-    operator.take_seat()
-    operator.pulls(".stick", right=0.0, up=0.6)
-    robot.comes_to(lambda status: min(speeds(status)) > MOVING_M_S)
+    drives(operator, robot, moving)
     return operator
 
 
@@ -56,9 +60,7 @@ def test_a_takeover_stops_the_first_and_both_see_it(first: Operator, second: Ope
     first.sees("#holder", r"(?<!you) has the robot")
     first.sees("#notes", "has the robot|taken the robot over")
     first.page.mouse.up()
-    second.take_seat()
-    second.pulls(".stick", right=0.0, up=0.6)
-    robot.comes_to(lambda status: min(speeds(status)) > MOVING_M_S)
+    drives(second, robot, moving)
     second.page.mouse.up()
     robot.comes_to_rest(UNHELD_S)
 
@@ -70,9 +72,7 @@ def test_what_was_taken_over_is_given_back(first: Operator, second: Operator, ro
     first.page.mouse.up()
     second.page.click("#takeover")
     first.sees("#holder", "^$")
-    first.take_seat()
-    first.pulls(".stick", right=0.0, up=0.6)
-    robot.comes_to(lambda status: min(speeds(status)) > MOVING_M_S)
+    drives(first, robot, moving)
     first.page.mouse.up()
 
 

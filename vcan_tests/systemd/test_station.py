@@ -83,6 +83,8 @@ async def test_a_port_that_is_taken_is_told_in_its_journal_and_not_tried_again(d
     assert dark_robot.show("NRestarts", STATION) == "0"
 
 
-def test_without_a_file_of_tokens_it_is_not_started_and_the_file_is_named(dark_robot: Robot) -> None:
-    assert tell("systemctl", "start", STATION).returncode != 0
-    assert f"AssertPathExists={TOKENS} was not met" in tell("systemctl", "status", STATION).stdout
+async def test_without_a_file_of_tokens_it_ends_and_names_the_file(dark_robot: Robot) -> None:
+    journal = Journal(STATION)
+    tell("systemctl", "start", STATION)
+    await until(lambda: dark_robot.show("ActiveState", STATION) == "failed")
+    await journal.has(f"the tokens in {TOKENS} cannot be read: No such file or directory")
