@@ -28,7 +28,7 @@ export class PathFiles {
       exporting: this.#button("Export", () => this.#export()),
       record: this.#button("Record a drive", () => this.#record()),
     };
-    this.direction = h("p", { class: "reason", role: "status" });
+    this.writing = h("p", { class: "reason", role: "status" });
     this.told = h("p", { class: "reason", role: "status" });
     this.element = this.#fieldset();
     station.on("connected", () => this.#connected());
@@ -49,7 +49,7 @@ export class PathFiles {
       h("legend", {}, "Kept paths"),
       row(h("label", { class: "field" }, "Path", this.select), load, remove),
       row(h("label", { class: "field" }, "Name", this.name), save, importing, exporting, this.file),
-      this.direction,
+      this.writing,
       this.question.element,
       row(record),
       this.told,
@@ -66,7 +66,7 @@ export class PathFiles {
     allow(buttons.save, empty ?? named ?? station.cannot("station.path.write"));
     allow(buttons.exporting, empty);
     allow(buttons.importing, station.cannot("station.path.parse"));
-    text(this.direction, editor.exchanged && editor.entries.length ? EXCHANGED : "");
+    text(this.writing, editor.entries.length ? this.check.wrong() ?? (editor.exchanged ? EXCHANGED : "") : "");
     allow(buttons.record, station.cannot("station.record.start"));
     text(buttons.record, this.#recording ? "End the recording" : "Record a drive");
   }
