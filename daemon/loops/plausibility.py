@@ -6,7 +6,6 @@ The checks know nothing of devices and of what is done about a contradiction. Wh
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -75,10 +74,13 @@ class EncoderJumps:
                 continue
             gap_s = time_s - before_s
             self._last[index] = (angle, time_s, gap_s)
+            change, margin = abs(angle - before), self._margins_rad[index]
+            if change <= margin:
+                continue
             possible_s = max(gap_s, gap_before_s, self._period_s)
-            limit = self._margins_rad[index] + TURNING_ALLOWANCE * self._rates_rad_s[index] * possible_s
-            if not abs(angle - before) <= limit:
-                return Contradiction(index, math.fabs(angle - before), limit)
+            limit = margin + TURNING_ALLOWANCE * self._rates_rad_s[index] * possible_s
+            if not change <= limit:
+                return Contradiction(index, change, limit)
         return None
 
 

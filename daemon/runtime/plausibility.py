@@ -126,8 +126,9 @@ class Plausibility:
 
     def _pulled(self, measurement: Measurement, command: Command, dt_s: float, driving: bool) -> DeviceFault | None:
         """The first motor whose current does not fit the motion of its wheel; a robot that pushes something is let."""
+        driving = driving and not self._vehicle.pushing
         for index, direction, check in self._currents:
-            if not driving or self._vehicle.pushing:
+            if not driving:
                 check.begin_anew()
                 continue
             drive = self._drives[index]
