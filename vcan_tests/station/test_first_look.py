@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
 from vcan_tests.station.accessibility import findings
-from vcan_tests.station.browser import CONNECTED, Operator
+from vcan_tests.station.browser import CONNECTED, PANELS, PHONE, Operator
 from vcan_tests.station.conftest import Meet
 from vcan_tests.station.processes import Fleet, Station
 from vcan_tests.station.test_doors import TOKENS
+from vcan_tests.station.test_reasons import untold
 
 pytestmark = pytest.mark.station
 
@@ -68,9 +70,9 @@ def test_without_any_robot_the_page_says_how_to_start_one(meet: Meet, fleet: Fle
     assert findings(operator.page) == []
 
 
-def log_in(meet: Meet, station: Station, token: str) -> Operator:
+def log_in(meet: Meet, station: Station, token: str, **options: Any) -> Operator:
     """Somebody who has pasted this where a token belongs."""
-    operator = meet(station.url)
+    operator = meet(station.url, **options)
     operator.open()
     operator.page.fill("#token", token)
     operator.page.click("#login button")
@@ -97,3 +99,9 @@ def test_the_page_shows_its_role_and_the_way_out(meet: Meet, guarded: Station, r
     operator.sees("#who", f": {words}$")
     operator.page.click("#logout")
     operator.page.wait_for_selector("#login input")
+
+
+def test_a_person_who_may_only_watch_reads_why_nothing_can_be_done(meet: Meet, guarded: Station) -> None:
+    operator = log_in(meet, guarded, TOKENS["watch"], **PHONE)
+    operator.sees("#who", "watching")
+    assert untold(operator) == {panel: [] for panel in PANELS}

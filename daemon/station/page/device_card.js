@@ -1,7 +1,7 @@
 /** One drive, encoder, brake or brick as a card. */
 
 import { badge, setBadge } from "./badge.js";
-import { allow, h, number, text } from "./dom.js";
+import { allow, attribute, h, number, text } from "./dom.js";
 import { Jog } from "./jog.js";
 import { Bar, Facts } from "./rows.js";
 
@@ -86,6 +86,7 @@ export class DriveCard {
     this.#name = node.name;
     this.head = head(node.name, place(node));
     this.#bar = new Bar(`Current of ${node.name}`);
+    this.#current.append(h("span"), h("span", { class: "limit" }), this.#bar.element);
     this.#statusword = new Statusword(station, node.name);
     this.enable = this.#button("Enable", "motor.enable");
     this.disable = this.#button("Disable", "motor.disable");
@@ -119,11 +120,11 @@ export class DriveCard {
     if (node.current_a == null) return null;
     if (!this.#asked && node.node_state === "ready") this.#askLimit();
     const told = `${number(node.current_a, 2)} A`;
-    if (this.#limit_a == null) return told;
-    const words = `${told} of ${number(this.#limit_a, 2)} A continuous`;
-    this.#bar.show(node.current_a, this.#limit_a, words);
-    if (!this.#current.firstChild) this.#current.append(h("span"), this.#bar.element);
-    text(this.#current.firstChild, words);
+    const limit = `of ${number(this.#limit_a, 2)} A continuous`;
+    text(this.#current.children[0], told);
+    text(this.#current.children[1], limit);
+    if (this.#limit_a != null) this.#bar.show(node.current_a, this.#limit_a, `${told} ${limit}`);
+    attribute(this.#bar.element, "data-unknown", this.#limit_a == null);
     return this.#current;
   }
 

@@ -18,6 +18,9 @@ class DrivePanel {
   #aside = null;
   #takenAtRest = [];
   #taken = new TakenAtRest([]);
+  #learning = true;
+  #hands;
+  #byGamepad;
   #motions;
   #sliders;
   #stick = new Stick(this.#control((stick) => this.#byStick(stick), () => this.#stick));
@@ -68,15 +71,16 @@ class DrivePanel {
   #build() {
     const commanded = h("p", { class: "commanded" }, "Commanded: ", this.#sent);
     const byStick = h("div", {}, this.#stick.element, this.#asideHint, commanded);
+    const byKeys = h("div", { class: "row" }, this.#keyboard.button, this.#keyboard.hint);
+    this.#hands = h("div", { class: "stack" }, h("div", { class: "hands" }, byStick, this.#sliders.element), byKeys);
+    this.#byGamepad = h("div", { class: "stack" }, h("h3", {}, "Gamepad"), this.#gamepad.element);
     return h(
       "section",
       { class: "drive" },
       h("h2", {}, "Drive by hand"),
       this.#why,
-      h("div", { class: "hands" }, byStick, this.#sliders.element),
-      h("div", { class: "row" }, this.#keyboard.button, this.#keyboard.hint),
-      h("h3", {}, "Gamepad"),
-      this.#gamepad.element,
+      this.#hands,
+      this.#byGamepad,
       this.#motions.element,
     );
   }
@@ -89,7 +93,8 @@ class DrivePanel {
         draw();
       });
     }
-    station.on("shape", () => this.#learn());
+    station.on("robot", () => (this.#learning = true));
+    station.on("shape", () => this.#learn().then(draw));
     const letGo = () => this.#setPoints.releaseAll();
     for (const end of ["blur", "pagehide", "hashchange"]) addEventListener(end, letGo);
     document.addEventListener("visibilitychange", () => document.hidden && letGo());
@@ -98,8 +103,10 @@ class DrivePanel {
   /** How this vehicle is driven: its sticks, where it has any. */
   async #learn() {
     const { shape } = this.#station;
+    this.#learning = true;
     const told = await this.#station.call("drive.gamepad").catch(() => null);
     if (shape !== this.#station.shape) return;
+    this.#learning = false;
     const taken = told?.taken_at_rest ?? [];
     this.#setPoints.releaseAll();
     this.#ranges = rangesOf(told, shape);
@@ -121,8 +128,10 @@ class DrivePanel {
   }
 
   #show() {
-    const reason = this.#station.cannot("drive.set");
-    text(this.#why, reason ? `Cannot be driven now: ${reason}` : "");
+    const lack = this.#station.lacks("drive.set");
+    const reason = this.#station.cannot("drive.set") ?? (this.#learning ? "its limits are being asked for" : null);
+    text(this.#why, lack ?? (reason ? `Cannot be driven now: ${reason}` : ""));
+    this.#hands.hidden = this.#byGamepad.hidden = Boolean(lack);
     this.#why.hidden = !reason;
     this.#stick.allow(reason);
     this.#sliders.allow(reason);

@@ -1,6 +1,6 @@
 /** Single motions and the brakes: each a row of inputs and a button, disabled with the reason where there is none. */
 
-import { allow, attribute, h, number, text } from "./dom.js";
+import { allow, h, number, text } from "./dom.js";
 
 const key = (name) => name.replaceAll(/[^a-z]/g, "-");
 
@@ -36,6 +36,7 @@ class Row {
   }
 
   show() {
+    this.element.hidden = Boolean(this.#station.lacks(this.#method));
     const reason = this.#station.cannot(this.#method);
     allow(this.#button, reason);
     text(this.#reason, reason);
@@ -97,17 +98,11 @@ function buttons(station, told) {
 
 const drives = (station) => (station.status?.nodes ?? []).filter((node) => "target_speed_m_s" in node);
 
-function wordsOfDrives(station) {
-  const all = drives(station);
-  const enabled = all.filter((node) => node.state === "enabled");
-  return all.length ? `${enabled.length} of ${all.length} enabled` : "no drives";
+function wordsOfDrives(all) {
+  return `${all.filter((node) => node.state === "enabled").length} of ${all.length} enabled`;
 }
 
-function wordsOfBrakes(station) {
-  return (station.status?.brakes ?? []).map((brake) => `${brake.name}: ${brake.state}`).join(", ");
-}
-
-/** Power of the drives, and brakes. */
+/** Power of the drives, and brakes, as far as the vehicle has them. */
 function powerAndBrakes(station) {
   const names = () => drives(station).map((node) => node.name);
   const power = buttons(station, [
@@ -121,27 +116,28 @@ function powerAndBrakes(station) {
     ]).map((each) => ({ ...each, pair })),
   );
   const [powered, braked] = [h("output", { class: "muted" }), h("output", { class: "muted" })];
-  const element = h(
-    "div",
-    { class: "stack" },
-    h("div", { class: "row" }, power.map((each) => each.button), powered),
-    h("div", { class: "row" }, brakes.map((each) => each.button), braked),
-  );
+  const why = h("p", { class: "reason" });
+  const title = h("h3");
+  const ofPower = h("div", { class: "row" }, power.map((each) => each.button), powered);
+  const ofBrakes = h("div", { class: "row" }, brakes.map((each) => each.button), braked);
+  const element = h("div", { class: "stack" }, title, ofPower, ofBrakes, why);
   const show = () => {
-    for (const { method, button, pair } of [...power, ...brakes]) {
-      const reason = station.cannot(method) ?? reasonOfPair(station, pair);
+    const reasons = [...power, ...brakes].map(({ method, button }) => {
+      const reason = station.cannot(method);
       allow(button, reason);
-      if (pair) attribute(button, "aria-label", reason ? `${button.textContent} (${reason})` : null);
-    }
-    text(powered, wordsOfDrives(station));
-    text(braked, wordsOfBrakes(station) || "this vehicle has no brakes");
+      return button.hidden ? null : reason;
+    });
+    text(why, [...new Set(reasons.filter(Boolean))].map((reason) => `Not now: ${reason}.`).join(" "));
+    const [all, has] = [drives(station), station.status?.brakes ?? []];
+    ofPower.hidden = !all.length;
+    ofBrakes.hidden = !has.length;
+    for (const { button, pair } of brakes) button.hidden = !has.some(({ name }) => name === pair);
+    element.hidden = !all.length && !has.length;
+    text(title, has.length ? "Power and brakes" : "Power");
+    text(powered, wordsOfDrives(all));
+    text(braked, has.map((brake) => `${brake.name}: ${brake.state}`).join(", "));
   };
   return { element, show };
-}
-
-function reasonOfPair(station, pair) {
-  const has = (station.status?.brakes ?? []).map((brake) => brake.name);
-  return !pair || has.includes(pair) ? null : `there is no brake ${pair}: ${has.join(", ")}`;
 }
 
 /** The motions that are under way, whoever has begun them, each with a button that ends it by its ramp. */
@@ -180,13 +176,11 @@ export function createMotions(station) {
   const all = rows(station);
   const power = powerAndBrakes(station);
   const list = running(station);
-  const element = h(
-    "div",
-    { class: "stack" },
-    list.element,
-    h("h3", {}, "Power and brakes"),
-    power.element,
-    h("details", {}, h("summary", {}, "Single motions"), all.map((row) => row.element)),
-  );
-  return { element, show: () => [...all, power, list].forEach((each) => each.show()) };
+  const single = h("details", {}, h("summary", {}, "Single motions"), all.map((row) => row.element));
+  const element = h("div", { class: "stack" }, list.element, power.element, single);
+  const show = () => {
+    for (const each of [...all, power, list]) each.show();
+    single.hidden = all.every((row) => row.element.hidden);
+  };
+  return { element, show };
 }

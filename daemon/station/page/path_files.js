@@ -29,6 +29,7 @@ export class PathFiles {
       record: this.#button("Record a drive", () => this.#record()),
     };
     this.writing = h("p", { class: "reason", role: "status" });
+    this.why = h("p", { class: "reason" });
     this.told = h("p", { class: "reason", role: "status" });
     this.element = this.#fieldset();
     station.on("connected", () => this.#connected());
@@ -52,6 +53,7 @@ export class PathFiles {
       this.writing,
       this.question.element,
       row(record),
+      this.why,
       this.told,
     );
   }
@@ -61,13 +63,21 @@ export class PathFiles {
     const chosen = select.value ? null : "no path is kept yet";
     const empty = this.#unwritable();
     const named = name.value && name.checkValidity() ? null : "give it a name: letters, digits, - and _";
-    allow(buttons.load, chosen ?? station.cannot("station.path.read"));
-    allow(buttons.remove, chosen ?? station.cannot("station.path.delete"));
-    allow(buttons.save, empty ?? named ?? station.cannot("station.path.write"));
+    const load = chosen ?? station.cannot("station.path.read");
+    const remove = chosen ?? station.cannot("station.path.delete");
+    const save = empty ?? named ?? station.cannot("station.path.write");
+    const record = station.cannot("station.record.start");
+    allow(buttons.load, load);
+    allow(buttons.remove, remove);
+    allow(buttons.save, save);
     allow(buttons.exporting, empty);
-    allow(buttons.importing, station.cannot("station.path.parse"));
+    const parse = station.cannot("station.path.parse");
+    allow(buttons.importing, parse);
     text(this.writing, editor.entries.length ? this.check.wrong() ?? (editor.exchanged ? EXCHANGED : "") : "");
-    allow(buttons.record, station.cannot("station.record.start"));
+    allow(buttons.record, record);
+    const elsewhere = save === this.writing.textContent;
+    const reasons = { Load: load, Delete: remove, Save: elsewhere ? null : save, "Import…": parse, Record: record };
+    text(this.why, reasonsOf(reasons));
     text(buttons.record, this.#recording ? "End the recording" : "Record a drive");
   }
 
@@ -209,6 +219,14 @@ export class PathFiles {
     if (kind !== "bad" || piece === null) return;
     this.station.say(`${done}, but it cannot be driven: ${message}`, "warning", remedy);
   }
+}
+
+/** Reasons by the buttons that they keep from being used, each reason once. */
+function reasonsOf(told) {
+  const given = Object.entries(told).filter(([, reason]) => reason);
+  const reasons = [...new Set(given.map(([, reason]) => reason))];
+  const names = (reason) => given.filter(([, other]) => other === reason).map(([name]) => name);
+  return reasons.map((reason) => `${names(reason).join(", ")}: ${reason}.`).join(" ");
 }
 
 function titled(name, length_m) {

@@ -45,6 +45,11 @@ export function reasonAgainst(station, method) {
   );
 }
 
+/** What this vehicle lacks for a method, for people; null where it has all, or nothing is known of it yet. */
+export function lackOf(station, method) {
+  return station.status ? reasonOfVehicle(station, method) : null;
+}
+
 function reasonOfRole(station, method, needed = "watch") {
   if (RANK.indexOf(station.role) >= RANK.indexOf(needed)) return null;
   const way = station.status?.role_remedy;

@@ -18,6 +18,11 @@ export function create(station) {
   return new RunsPanel(station).element;
 }
 
+/** A cell that tells its own head where a phone shows the rows as cards; the roles stay when it is no table there. */
+function cell(head) {
+  return h("td", { role: "cell", "data-head": head, class: head === "Duration" ? "number" : null });
+}
+
 class RunsPanel {
   #rows;
   #chosen = null;
@@ -41,6 +46,8 @@ class RunsPanel {
     this.button = h("button", { type: "button", onclick: () => this.reload() }, "Reload");
     const { table: element, body } = table("Runs, the newest first", HEADS);
     this.#rows = new Rows(body, (run) => this.#row(run), ({ run }) => run);
+    attribute(element, "role", "table");
+    attribute(body, "role", "rowgroup");
     this.told = h("p", { class: "reason", role: "status" });
     this.title = h("h3");
     this.picture = h("img", { class: "run-picture", hidden: true, alt: "" });
@@ -48,10 +55,11 @@ class RunsPanel {
     this.picture.addEventListener("error", () => this.#notDrawn());
     this.drawing = h("p", { class: "reason", role: "status" });
     const title = h("h2", { id: "runs-title" }, "Runs");
-    const row = h("div", { class: "row" }, this.button);
+    this.why = h("span", { class: "reason" });
+    const row = h("div", { class: "row" }, this.button, this.why);
     this.opened = h("section", { "aria-label": "Opened run", hidden: true }, this.title, this.drawing, this.picture);
     const parts = [title, row, this.told, this.opened, h("div", { class: "scroll" }, element)];
-    this.element = h("section", { "aria-labelledby": "runs-title" }, ...parts);
+    this.element = h("section", { class: "runs", "aria-labelledby": "runs-title" }, ...parts);
   }
 
   #seen() {
@@ -59,7 +67,9 @@ class RunsPanel {
   }
 
   #show() {
-    allow(this.button, this.station.cannot("station.runs"));
+    const reason = this.station.cannot("station.runs");
+    allow(this.button, reason);
+    text(this.why, reason ? `Not now: ${reason}` : "");
   }
 
   #forget() {
@@ -86,9 +96,9 @@ class RunsPanel {
   #row(run) {
     const act = { type: "button", "aria-label": `Open run ${run.run}`, onclick: () => this.#open(run) };
     const open = h("button", act, run.run);
-    const [when, method, ended, files] = [h("td"), h("td"), h("td"), h("td")];
-    const cells = { when, method, ended, duration: h("td", { class: "number" }), files };
-    const element = h("tr", {}, h("th", { scope: "row" }, open), ...Object.values(cells));
+    const [when, method, ended, duration, files] = HEADS.slice(1).map(cell);
+    const cells = { when, method, ended, duration, files };
+    const element = h("tr", { role: "row" }, h("th", { scope: "row", role: "rowheader" }, open), Object.values(cells));
     return { element, show: (now) => this.#fill(element, cells, now) };
   }
 

@@ -78,9 +78,9 @@ class Blocks {
   /** @param {object} seen what `simulation.look` tells, or its `error` */
   show({ lifted, error }) {
     const reason = error ?? this.#station.cannot("simulation.lift");
-    allow(this.#up, reason ?? (lifted ? "it stands on blocks already" : null));
-    allow(this.#down, reason ?? (lifted ? null : "it stands on the floor already"));
     const stands = lifted ? "It stands on blocks, its wheels in the air." : "It stands on the floor.";
+    allow(this.#up, reason ?? (lifted ? stands : null));
+    allow(this.#down, reason ?? (lifted ? null : stands));
     text(this.#told, reason ? `Not now: ${reason}` : stands);
   }
 

@@ -3,12 +3,6 @@
 import { allow, h, number, text } from "./dom.js";
 
 const LABELS = { speed: "Speed", direction: "Direction", yaw_rate: "Yaw rate", steering: "Steering" };
-const LACKS = {
-  speed: "this vehicle is not driven by hand",
-  direction: "this vehicle cannot drive sideways",
-  yaw_rate: "this vehicle turns by its steering",
-  steering: "this vehicle has no steered wheels",
-};
 const DIGITS = { "m/s": 2, deg: 0, "deg/s": 0 };
 const STEPS = { "m/s": 0.005, deg: 0.5, "deg/s": 0.5 };
 /** Share of the vehicle's own limit that a person begins with. */
@@ -16,22 +10,19 @@ const FIRST_SHARE = 0.5;
 
 class Slider {
   #range = null;
-  #lack;
 
-  constructor(name, label, lack) {
-    this.#lack = lack;
+  constructor(name, label) {
     this.shown = h("output", { for: `slider-${name}` });
     this.input = h("input", { type: "range", id: `slider-${name}`, min: -1, max: 1, step: "any", value: 0 });
-    this.why = h("span", { class: "reason", id: `why-${name}` });
-    this.input.setAttribute("aria-describedby", this.why.id);
     const named = h("label", { for: this.input.id }, label);
-    this.element = h("div", { class: "slider" }, named, this.input, this.shown, this.why);
+    this.element = h("div", { class: "slider" }, named, this.input, this.shown);
     this.input.addEventListener("input", () => this.show());
   }
 
-  /** The ends of this vehicle; null where it has no such command. */
+  /** The ends of this vehicle; null where it has no such command, which is left out. */
   use(range, value = 0) {
     this.#range = range;
+    this.element.hidden = !range;
     if (range) {
       Object.assign(this.input, { min: range.least, max: range.full });
       this.input.value = value;
@@ -58,15 +49,13 @@ class Slider {
   }
 
   allow(reason) {
-    const why = this.#range ? reason : this.#lack;
-    allow(this.input, why);
-    text(this.why, this.#range ? "" : why);
+    allow(this.input, reason);
   }
 }
 
 export class Sliders {
-  #sliders = Object.fromEntries(Object.keys(LABELS).map((name) => [name, new Slider(name, LABELS[name], LACKS[name])]));
-  #fastest = new Slider("fastest", "Top speed", LACKS.speed);
+  #sliders = Object.fromEntries(Object.keys(LABELS).map((name) => [name, new Slider(name, LABELS[name])]));
+  #fastest = new Slider("fastest", "Top speed");
   #ranges = {};
   #held = false;
   #onHold;

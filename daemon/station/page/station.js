@@ -2,7 +2,7 @@
 
 import { Connection } from "./connection.js";
 import { Lease } from "./lease.js";
-import { reasonAgainst } from "./reasons.js";
+import { lackOf, reasonAgainst } from "./reasons.js";
 import { StopAlarm } from "./stop_alarm.js";
 
 /** Age at which values are stale. */
@@ -107,6 +107,11 @@ class Station {
   /** Why a method cannot be called now, for people; null where it can. */
   cannot(method) {
     return reasonAgainst(this, method);
+  }
+
+  /** What this vehicle has not got for a method, however it stands; null where it has. */
+  lacks(method) {
+    return lackOf(this, method);
   }
 
   /** Tell people something: info, warning or error, and what to do; with a key it stays until that is unsaid. */
