@@ -2,6 +2,7 @@
 
 import { badge, setBadge } from "./badge.js";
 import { allow, attribute, h, text } from "./dom.js";
+import { field, put, settleWriting, wrongIn } from "./fields.js";
 import { Rows, table } from "./rows.js";
 
 /** Rubber on wet ice. */
@@ -12,8 +13,8 @@ const NO_WHEEL = /drives no wheel on a floor/;
 /** Tilts the floor. */
 export class Slope {
   #station;
-  #slope = h("input", { type: "number", step: 0.5, value: 0, required: true });
-  #direction = h("input", { type: "number", step: 5, min: -180, max: 180, value: 0, required: true });
+  #slope = field("Slope in degrees", { value: 0, required: true }, () => {});
+  #direction = field("Downhill towards, in degrees", { min: -180, max: 180, value: 0, required: true }, () => {});
   #tilt = h("button", { type: "submit" }, "Tilt");
   #level = h("button", { type: "button", onclick: () => this.#makeLevel() }, "Make level");
   #now = h("p", { role: "status" });
@@ -30,7 +31,7 @@ export class Slope {
     const slope = h("label", {}, "Slope ", this.#slope, " °");
     const direction = h("label", {}, "downhill towards ", this.#direction, " °");
     const hint = h("p", { class: "aside" }, "Downhill: 0° along x of the map, 90° along y.");
-    this.element = h("form", { "aria-label": "Slope" }, h("div", { class: "row" }, slope, direction, this.#tilt,
+    this.element = h("form", { "aria-label": "Slope", novalidate: true }, h("div", { class: "row" }, slope, direction, this.#tilt,
       this.#level), this.#now, hint, this.#why);
     this.element.addEventListener("submit", (event) => {
       event.preventDefault();
@@ -56,11 +57,13 @@ export class Slope {
   }
 
   #makeLevel() {
-    this.#slope.value = 0;
+    put(this.#slope, 0);
     this.#ask();
   }
 
   async #ask() {
+    settleWriting();
+    if (wrongIn(this.element)) return;
     const asked = { slope_deg: Number(this.#slope.value), direction_deg: Number(this.#direction.value) };
     await this.#station.attempt(this.#station.call("simulation.slope", asked), "tilting the floor");
     this.#changed();
@@ -72,7 +75,7 @@ export class Ice {
   #station;
   #changed;
   #wheels = [];
-  #friction = h("input", { type: "number", min: 0.001, max: 2, step: "any", value: FIRST_FRICTION, required: true });
+  #friction = field("Coefficient of friction", { min: 0.001, max: 2, value: FIRST_FRICTION, required: true }, () => {});
   #all = h("button", { type: "button", onclick: () => this.#layAll() }, "All wheels on ice");
   #none = h("button", { type: "button", onclick: () => this.#takeAway(this.#wheels) }, "Take all ice away");
   #why = h("p", { class: "reason" });
@@ -128,7 +131,8 @@ export class Ice {
 
   /** Wheels that the simulation does not know are left out, where others could be laid on ice. */
   async #lay(wheels) {
-    if (!this.#friction.reportValidity()) return;
+    settleWriting();
+    if (wrongIn(this.element)) return;
     const friction = Number(this.#friction.value);
     const lay = ({ name }) => this.#station.call("simulation.fault", { kind: "ice", part: name, friction });
     const ended = await Promise.allSettled(wheels.map(lay));

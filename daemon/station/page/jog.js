@@ -1,10 +1,12 @@
 /** Turning one motor by hand: as long as a button is held, and no longer. */
 
 import { allow, attribute, h } from "./dom.js";
+import { field, settleWriting, wrongIn } from "./fields.js";
 
 /** Time after which a motor stops, however long its button is held. */
 const LONGEST_S = 10;
 const FIRST_RPM = 100;
+const LIMITS = { min: 1, max: 100000, value: FIRST_RPM, required: true };
 const LET_GO = ["pointerup", "pointercancel", "lostpointercapture", "blur"];
 
 export class Jog {
@@ -23,7 +25,7 @@ export class Jog {
   constructor(station, drive) {
     this.#station = station;
     this.#drive = drive;
-    this.#input = h("input", { type: "number", min: 1, max: 100000, step: 1, value: FIRST_RPM, inputmode: "numeric" });
+    this.#input = field(`Jog ${drive} at, in rpm`, LIMITS, () => {});
     this.#buttons = [this.#button("◀ Back", -1), this.#button("Forward ▶", 1)];
     const speed = h("label", {}, "Jog at ", this.#input, " rpm");
     this.element = h("div", { class: "jog", role: "group", "aria-label": `Jog ${drive}` }, speed,
@@ -57,8 +59,9 @@ export class Jog {
 
   /** A motor that is still being stopped is waited for. */
   async #press(direction) {
-    const speed_rpm = Number(this.#input.value);
-    if (this.#held || !this.#input.reportValidity() || !speed_rpm) return;
+    settleWriting();
+    if (this.#held || wrongIn(this.element)) return;
+    const speed_rpm = this.#input.valueAsNumber;
     const held = this.#hold({ direction });
     await this.#turning;
     if (held !== this.#held) return;
