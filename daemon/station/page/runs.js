@@ -58,7 +58,8 @@ class RunsPanel {
     this.why = h("span", { class: "reason" });
     const row = h("div", { class: "row" }, this.button, this.why);
     this.opened = h("section", { "aria-label": "Opened run", hidden: true }, this.title, this.drawing, this.picture);
-    const parts = [title, row, this.told, this.opened, h("div", { class: "scroll" }, element)];
+    this.list = h("div", { class: "scroll", hidden: true }, element);
+    const parts = [title, row, this.told, this.opened, this.list];
     this.element = h("section", { class: "runs", "aria-labelledby": "runs-title" }, ...parts);
   }
 
@@ -74,9 +75,15 @@ class RunsPanel {
 
   #forget() {
     this.#asked += 1;
-    this.#rows.show([]);
+    this.#showList([]);
     this.#close();
     text(this.told, "");
+  }
+
+  /** An empty table is left out. */
+  #showList(runs) {
+    this.#rows.show(runs);
+    this.list.hidden = !runs.length;
   }
 
   /** Read the list of runs anew; open the newest, if that is wanted. */
@@ -85,7 +92,7 @@ class RunsPanel {
     const answer = await this.station.attempt(this.station.call("station.runs", {}, { timeout_ms: 15_000 }), "Runs");
     if (!answer || asked !== this.#asked) return;
     const runs = answer.runs.toReversed();
-    this.#rows.show(runs);
+    this.#showList(runs);
     text(this.told, runs.length ? `${runs.length} runs` : "No runs yet: every motion leaves one.");
     if (this.#wanted && runs.length) this.#open(runs[0]);
     this.#wanted = false;
