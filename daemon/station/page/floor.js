@@ -13,8 +13,8 @@ const NO_WHEEL = /drives no wheel on a floor/;
 /** Tilts the floor. */
 export class Slope {
   #station;
-  #slope = field("Slope in degrees", { value: 0, required: true }, () => {});
-  #direction = field("Downhill towards, in degrees", { min: -180, max: 180, value: 0, required: true }, () => {});
+  #slope = field("Slope in degrees", { required: true }, () => {});
+  #direction = field("Downhill towards, in degrees", { min: -180, max: 180, required: true }, () => {});
   #tilt = h("button", { type: "submit" }, "Tilt");
   #level = h("button", { type: "button", onclick: () => this.#makeLevel() }, "Make level");
   #now = h("p", { role: "status" });
@@ -28,6 +28,7 @@ export class Slope {
   constructor(station, changed) {
     this.#station = station;
     this.#changed = changed;
+    for (const box of [this.#slope, this.#direction]) put(box, 0);
     const slope = h("label", {}, "Slope ", this.#slope, " °");
     const direction = h("label", {}, "downhill towards ", this.#direction, " °");
     const hint = h("p", { class: "aside" }, "Downhill: 0° along x of the map, 90° along y.");
@@ -75,7 +76,7 @@ export class Ice {
   #station;
   #changed;
   #wheels = [];
-  #friction = field("Coefficient of friction", { min: 0.001, max: 2, value: FIRST_FRICTION, required: true }, () => {});
+  #friction = field("Coefficient of friction", { min: 0.001, max: 2, required: true }, () => {});
   #all = h("button", { type: "button", onclick: () => this.#layAll() }, "All wheels on ice");
   #none = h("button", { type: "button", onclick: () => this.#takeAway(this.#wheels) }, "Take all ice away");
   #why = h("p", { class: "reason" });
@@ -88,6 +89,7 @@ export class Ice {
   constructor(station, changed) {
     this.#station = station;
     this.#changed = changed;
+    put(this.#friction, FIRST_FRICTION);
     const { table: element, body } = table("Ice under the wheels", ["Wheel", "On", "Change"]);
     this.#rows = new Rows(body, (wheel) => this.#row(wheel));
     const friction = h("label", {}, "Coefficient of friction ", this.#friction);

@@ -1,12 +1,12 @@
 /** Turning one motor by hand: as long as a button is held, and no longer. */
 
 import { allow, attribute, h } from "./dom.js";
-import { field, settleWriting, wrongIn } from "./fields.js";
+import { field, put, settleWriting, wrongIn } from "./fields.js";
 
 /** Time after which a motor stops, however long its button is held. */
 const LONGEST_S = 10;
 const FIRST_RPM = 100;
-const LIMITS = { min: 1, max: 100000, value: FIRST_RPM, required: true };
+const LIMITS = { min: 1, max: 100000, required: true };
 const LET_GO = ["pointerup", "pointercancel", "lostpointercapture", "blur"];
 
 export class Jog {
@@ -26,6 +26,7 @@ export class Jog {
     this.#station = station;
     this.#drive = drive;
     this.#input = field(`Jog ${drive} at, in rpm`, LIMITS, () => {});
+    put(this.#input, FIRST_RPM);
     this.#buttons = [this.#button("◀ Back", -1), this.#button("Forward ▶", 1)];
     const speed = h("label", {}, "Jog at ", this.#input, " rpm");
     this.element = h("div", { class: "jog", role: "group", "aria-label": `Jog ${drive}` }, speed,
