@@ -10,6 +10,7 @@ import pytest
 from vcan_tests.station.browser import CONNECTED, PHONE, Operator
 from vcan_tests.station.conftest import Meet
 from vcan_tests.station.processes import UNHELD_S, Fleet, Robot, speeds
+from vcan_tests.station.stick import drives
 
 pytestmark = pytest.mark.station
 
@@ -60,8 +61,7 @@ def test_another_vehicle_is_chosen_and_shows_itself(meet: Meet, fleet: Fleet) ->
 def test_the_stick_drives_and_the_robot_is_at_rest_within_the_lease_when_it_is_let_go_of(
     driver: Operator, robot: Robot
 ) -> None:
-    driver.pulls(".stick", right=0.0, up=0.9)
-    driven = robot.comes_to(moving(0.3))
+    driven = drives(driver, robot, moving(0.3), up=0.9)
     assert driven["motions"][0]["kind"] == "drive.set"
     driver.sees("#commanded", "speed 0.[3-9]")
     driver.page.mouse.up()
@@ -70,8 +70,7 @@ def test_the_stick_drives_and_the_robot_is_at_rest_within_the_lease_when_it_is_l
 
 
 def test_the_stick_goes_aside_and_back(driver: Operator, robot: Robot) -> None:
-    driver.pulls(".stick", right=0.0, up=-0.9)
-    backward = robot.comes_to(moving(0.2))
+    backward = drives(driver, robot, moving(0.2), up=-0.9)
     driver.page.mouse.up()
     assert all(node["speed_m_s"] < 0.0 for node in backward["nodes"] if node.get("speed_m_s") is not None)
     robot.comes_to_rest(UNHELD_S)
@@ -110,8 +109,7 @@ def test_a_slider_drives_only_while_it_is_held(driver: Operator, robot: Robot) -
 
 
 def test_a_page_that_is_hidden_lets_go_and_does_not_go_on_when_it_is_seen_again(driver: Operator, robot: Robot) -> None:
-    driver.pulls(".stick", right=0.0, up=0.9)
-    robot.comes_to(moving(0.2))
+    drives(driver, robot, moving(0.2), up=0.9)
     driver.page.evaluate(HIDE, True)
     robot.comes_to_rest(UNHELD_S)
     driver.page.evaluate(HIDE, False)
@@ -122,16 +120,14 @@ def test_a_page_that_is_hidden_lets_go_and_does_not_go_on_when_it_is_seen_again(
 
 
 def test_another_panel_lets_go(driver: Operator, robot: Robot) -> None:
-    driver.pulls(".stick", right=0.0, up=0.9)
-    robot.comes_to(moving(0.2))
+    drives(driver, robot, moving(0.2), up=0.9)
     driver.page.evaluate("() => { location.hash = '#devices'; }")
     robot.comes_to_rest(UNHELD_S)
     driver.page.mouse.up()
 
 
 def test_a_page_that_freezes_leaves_a_robot_at_rest(driver: Operator, robot: Robot) -> None:
-    driver.pulls(".stick", right=0.0, up=0.9)
-    robot.comes_to(moving(0.2))
+    drives(driver, robot, moving(0.2), up=0.9)
     driver.page.evaluate("() => void setTimeout(() => { const end = Date.now() + 2500; while (Date.now() < end); })")
     robot.comes_to_rest(UNHELD_S)
     driver.page.mouse.up()
