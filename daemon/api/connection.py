@@ -7,13 +7,12 @@ import itertools
 import logging
 import os
 from collections.abc import Callable, Coroutine
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from canhelm import __version__, errors, protocol
 from canhelm.errors import CanhelmError, Refused, UsageError
 from daemon.api.metering import BYTES_PER_S, REQUESTS_PER_S, Meter
-from daemon.api.methods import METHODS, NOTIFICATIONS
+from daemon.api.methods import METHODS, NOTIFICATIONS, stops
 from daemon.api.parameters import Method, validate
 from daemon.api.peers import Peer
 from daemon.runtime.clock import outside_s, pace
@@ -34,8 +33,6 @@ MAX_UNSENT_BYTES = 1024 * 1024
 """Unsent bytes at which a client is dropped."""
 STALLED_S = 10.0
 """Time of lost samples on end after which a client is dropped."""
-MAX_NAME_LENGTH = 60
-"""Characters of what a client calls itself."""
 FAREWELL_S = 0.2
 """How long a client whose line was too long may still send, unheard: it reads its answer when it has sent all."""
 
@@ -161,7 +158,7 @@ class Connection(asyncio.Protocol):
                 return
             line = bytes(self._received[:end])
             message = protocol.parse_message(line)
-            wait_s = 0.0 if _stops(message) else self._meter.wait_s(end, outside_s())
+            wait_s = 0.0 if stops(message) else self._meter.wait_s(end, outside_s())
             if wait_s and len(self._received) == end + 1:  # it waits for its answers: this one comes later
                 self._go_on_later(wait_s)
                 return
@@ -340,12 +337,8 @@ class Connection(asyncio.Protocol):
         }
 
     async def _take_name(self, params: dict[str, Any]) -> dict[str, Any]:
-        name = params["name"].strip()
-        if not 0 < len(name) <= MAX_NAME_LENGTH or not name.isprintable():
-            remedy = f"give 1 to {MAX_NAME_LENGTH} printable characters"
-            raise UsageError("client.name: this is no name for a client", object="name", remedy=remedy)
-        self._peer = replace(self._peer, label=name)
-        return {"name": name}
+        self._peer = self._peer.called(params["name"].strip())
+        return {"name": self._peer.label}
 
     async def _schema(self, params: dict[str, Any]) -> dict[str, Any]:
         return {
@@ -404,9 +397,3 @@ class Connection(asyncio.Protocol):
         if outside_s() - self._slow_since > STALLED_S:
             self._drop("it stopped reading")
         return True
-
-
-def _stops(message: dict[str, Any] | str) -> bool:
-    """Whether a message asks for a method that stops the robot."""
-    name = message.get("method") if isinstance(message, dict) else None
-    return isinstance(name, str) and name in METHODS and METHODS[name].urgent

@@ -380,3 +380,9 @@ NOTIFICATIONS = {
     "status": "params as the result of status, plus lost_samples",
     "event": "time_s, unix_s (time of day), severity (info, warning, error), source, message, remedy",
 }
+
+
+def stops(message: dict[str, Any] | str) -> bool:
+    """Whether a message asks for a method that stops the robot."""
+    name = message.get("method") if isinstance(message, dict) else None
+    return isinstance(name, str) and name in METHODS and METHODS[name].urgent

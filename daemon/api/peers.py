@@ -12,7 +12,7 @@ import pwd
 import socket
 import struct
 from collections.abc import Collection
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ _GROUPS_BYTES = 1024
 """What Python asks for at most: 256 groups."""
 _RANK = {role: rank for rank, role in enumerate(Role)}
 _COMMAND_LENGTH = 80
+_NAME_LENGTH = 60
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +86,13 @@ class Peer:
         label = {"name": self.label} if self.label else {}
         process = {} if self.name else {"pid": self.pid, "command": self._command}
         return {**label, "user": self.user, **process}
+
+    def called(self, label: str) -> Peer:
+        """The same peer by a name of its own. Raises UsageError where people could not read that."""
+        if not 0 < len(label) <= _NAME_LENGTH or not label.isprintable():
+            remedy = f"give 1 to {_NAME_LENGTH} printable characters"
+            raise UsageError("client.name: this is no name for a client", object="name", remedy=remedy)
+        return replace(self, label=label)
 
     def told(self) -> str:
         """The same for messages."""
