@@ -16,6 +16,8 @@ from vcan_tests.station.browser import CHROMIUM
 
 MARK = "station"
 PACKAGES = ["chromium", "fonts-dejavu-core"]
+TWO_AT_A_TIME = ["-n", "2", "--dist", "loadfile"]
+"""Tests of two files, each with a browser and robots of its own: they wait more than they compute."""
 PICTURES = "CANHELM_PICTURES"
 """The folder that pictures are kept in, for the tests that take them."""
 
@@ -43,7 +45,7 @@ def require_chromium() -> None:
 
 def run(options: list[str], pictures: Path | None) -> Part:
     """Run the tests, or those alone that take pictures."""
-    chosen = ["vcan_tests/station/test_pictures.py"] if pictures else []
+    chosen = ["vcan_tests/station/test_pictures.py"] if pictures else TWO_AT_A_TIME
     kept = {PICTURES: str(pictures.resolve())} if pictures else {}
     with exchange_folder() as exchange:
         command = pytest_command(MARK, exchange, [*chosen, *options])

@@ -62,11 +62,13 @@ def test_a_path_that_begins_where_the_vehicle_is_says_that_it_begins_anew(drawer
 def test_a_path_with_a_start_of_its_own_stays_where_it_is(drawer: Operator) -> None:
     drawer.page.get_by_label("Begin where the vehicle is").uncheck()
     drawer.sees(PANEL, "Can be driven")
-    x = drawer.page.get_by_label("x of the start in metres").input_value()
+    box = drawer.page.get_by_label("x of the start in metres")
+    drawer.until(lambda: box.input_value() != "", lambda: "the start is not in its box")
+    x = box.input_value()
     drawer.page.click("#path-drive")
     drawer.sees(PANEL, "Arrived after")
     assert ANEW not in drawer.text(PANEL)
-    assert drawer.page.get_by_label("x of the start in metres").input_value() == x
+    assert box.input_value() == x
 
 
 def test_a_limit_that_is_far_is_told_and_not_drawn(operator: Operator) -> None:

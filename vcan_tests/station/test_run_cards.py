@@ -20,7 +20,7 @@ def test_each_run_is_a_card_whose_facts_stand_below_each_other(meet: Meet, robot
     operator = meet(**NARROW)
     operator.open(robot.name)
     operator.go_to("runs")
-    operator.sees(".runs", r"\d+ runs")
+    operator.sees(".runs", r"\d+ runs?")
     assert len(set(operator.page.evaluate(CELLS))) == 1
     assert operator.page.evaluate("() => document.querySelector('.runs .scroll').scrollWidth") <= 320
     assert operator.page.evaluate(TOO_WIDE) == []

@@ -93,7 +93,8 @@ class RunsPanel {
     if (!answer || asked !== this.#asked) return;
     const runs = answer.runs.toReversed();
     this.#showList(runs);
-    text(this.told, runs.length ? `${runs.length} runs` : "No runs yet: every motion leaves one.");
+    const count = `${runs.length} ${runs.length === 1 ? "run" : "runs"}`;
+    text(this.told, runs.length ? count : "No runs yet: every motion leaves one.");
     if (this.#wanted && runs.length) this.#open(runs[0]);
     this.#wanted = false;
   }

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import secrets
 from pathlib import Path
 
 import pytest
@@ -69,7 +68,7 @@ def test_a_line_that_is_no_token_is_told_with_its_place(tmp_path: Path, text: st
     assert WATCHES not in str(caught.value)
 
 
-@pytest.mark.parametrize("token", [secrets.token_hex(32), secrets.token_urlsafe(32), "A" * SHORTEST, "d" * SHORTEST])
+@pytest.mark.parametrize("token", ["5c1e09" * 10, "Zk3-q_8wVxTb1n" * 3, "A" * SHORTEST, "d" * SHORTEST])
 @pytest.mark.parametrize("form", ["{}", "{} drive", "drive{}", "{}\tdrive", "drive\t{}", "boss {}", "drive {} {}"])
 def test_no_part_of_a_token_is_told(tmp_path: Path, form: str, token: str) -> None:
     with pytest.raises(ConfigError) as caught:
