@@ -134,6 +134,7 @@ class Operator:
     def choose(self, robot: str) -> None:
         """Choose a robot; returns when the page shows its state."""
         self.page.wait_for_selector(f"#robot option[value='{robot}']", state="attached")
+        self.expects("WebSocket is closed before the connection is established")  # that of the robot shown before
         self.page.select_option("#robot", robot)
         self.sees("#connection", CONNECTED)
 
