@@ -275,7 +275,7 @@ def _descriptor_of(link: can.BusABC) -> int | None:
     """
     try:
         return link.fileno()
-    except NotImplementedError:  # what BusABC.fileno raises where a link has no descriptor, as that of `virtual:`
+    except NotImplementedError:  # python-can's only way to say so: BusABC.fileno as it stands, or slcan's own
         return None
 
 

@@ -113,20 +113,19 @@ def open_pages(browser: Browser, wire: Wire, robot: Robot, pages: int) -> Iterat
 
 
 def _cost(browser: Browser, fleet: Fleet, robot: Robot, pages: int, seconds: float) -> Cost:
-    with wire_to(fleet.station.port) as wire, open_pages(browser, wire, robot, pages) as operators:
+    with wire_to(fleet.station.port) as wire, open_pages(browser, wire, robot, pages):
         before = _counters(fleet, robot, wire)
-        _pass(operators, seconds)
+        _pass(browser, seconds)
         after = _counters(fleet, robot, wire)
     took_s, cycles, late, daemon_s, station_s, size = (now - then for now, then in zip(after, before, strict=True))
     return Cost(pages, took_s, int(cycles), int(late), daemon_s / took_s, station_s / took_s, size / took_s)
 
 
-def _pass(operators: list[Operator], seconds: float) -> None:
-    """Let time pass, in which the pages may tell of themselves."""
-    if operators:
-        operators[0].page.wait_for_timeout(seconds * 1e3)
-    else:
-        time.sleep(seconds)
+def _pass(browser: Browser, seconds: float) -> None:
+    """Let the time pass that is measured, at an empty page that asks nobody for anything."""
+    page = browser.new_page()
+    page.wait_for_timeout(seconds * 1e3)
+    page.close()
 
 
 def _counters(fleet: Fleet, robot: Robot, wire: Wire) -> tuple[float, ...]:

@@ -8,7 +8,7 @@ from vcan_tests.station.browser import CONNECTED, Operator
 from vcan_tests.station.conftest import Meet
 from vcan_tests.station.processes import Fleet, Robot, speeds
 from vcan_tests.station.test_network import LOST
-from vcan_tests.station.wire import wire_to
+from vcan_tests.station.wire import Wire, wire_to
 
 pytestmark = pytest.mark.station
 
@@ -68,16 +68,21 @@ def test_an_emergency_stop_is_told_once_and_names_the_button_that_ends_it(latche
     assert "canhelm reset" not in latched.text("body")
 
 
+def stops_in_vain(operator: Operator, wire: Wire, robot: Robot) -> Operator:
+    """Somebody presses the stop when the network is gone."""
+    operator.expects(*LOST)
+    operator.open(robot.name)
+    wire.cut()
+    operator.sees("#connection", "reconnecting")
+    operator.page.click("#stop")
+    return operator
+
+
 def test_a_stop_that_was_not_sent_says_when_and_how_often_and_is_settled_when_the_robot_stands(
     meet: Meet, fleet: Fleet, robot: Robot
 ) -> None:
     with wire_to(fleet.station.port) as wire:
-        operator = meet(wire.url)
-        operator.expects(*LOST)
-        operator.open(robot.name)
-        wire.cut()
-        operator.sees("#connection", "reconnecting")
-        operator.page.click("#stop")
+        operator = stops_in_vain(meet(wire.url), wire, robot)
         operator.sees("#alarms", f"stop NOT SENT at {CLOCK}: no connection")
         operator.page.keyboard.press("Space")
         operator.sees("#alarms", rf"stop NOT SENT at {CLOCK} \(2 times since {CLOCK}\)")
@@ -90,12 +95,7 @@ def test_a_stop_that_was_not_sent_stays_told_while_the_robot_moves_until_one_get
     meet: Meet, fleet: Fleet, robot: Robot
 ) -> None:
     with wire_to(fleet.station.port) as wire:
-        operator = meet(wire.url)
-        operator.expects(*LOST)
-        operator.open(robot.name)
-        wire.cut()
-        operator.sees("#connection", "reconnecting")
-        operator.page.click("#stop")
+        operator = stops_in_vain(meet(wire.url), wire, robot)
         robot.call("drive.parallel", angle_deg=0.0, speed_m_s=0.2, duration_s=60.0, wait=False)
         robot.comes_to(lambda status: min(speeds(status)) > 0.1)
         wire.mend()

@@ -38,19 +38,22 @@ def test_each_page_shows_a_name_of_its_own_and_what_it_may_do(pages: tuple[Opera
     assert name_of(first) != name_of(second)
 
 
-def test_the_holder_is_told_by_the_name_of_its_page(pages: tuple[Operator, Operator]) -> None:
+def the_first_drives(pages: tuple[Operator, Operator]) -> tuple[Operator, Operator]:
+    """The first holds the stick, and the second sees who has the robot."""
     first, second = pages
     first.take_seat()
     first.pulls(".stick", right=0.0, up=0.6)
     second.sees("#holder", f"^{name_of(first)} has the robot$")
+    return first, second
+
+
+def test_the_holder_is_told_by_the_name_of_its_page(pages: tuple[Operator, Operator]) -> None:
+    first, _ = the_first_drives(pages)
     first.page.mouse.up()
 
 
 def test_a_stop_on_one_page_is_told_on_the_other(pages: tuple[Operator, Operator], robot: Robot) -> None:
-    first, second = pages
-    first.take_seat()
-    first.pulls(".stick", right=0.0, up=0.6)
-    second.sees("#holder", "has the robot")
+    first, second = the_first_drives(pages)
     second.page.click("#stop")
     first.sees("#notes", f"stop was pressed on {name_of(second)}")
     second.sees("#notes", "stopped")
@@ -62,10 +65,7 @@ def test_a_stop_on_one_page_is_told_on_the_other(pages: tuple[Operator, Operator
 def test_a_takeover_is_told_on_the_other_page_by_the_name_of_who_took_the_robot(
     pages: tuple[Operator, Operator], robot: Robot
 ) -> None:
-    first, second = pages
-    first.take_seat()
-    first.pulls(".stick", right=0.0, up=0.6)
-    second.sees("#holder", "has the robot")
+    first, second = the_first_drives(pages)
     second.page.click("#takeover")
     first.sees("#notes", f"{name_of(second)} by .* has taken the robot over from {name_of(first)}")
     second.sees("#notes", f"you have the robot; {name_of(first)} .*had it")

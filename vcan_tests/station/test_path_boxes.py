@@ -38,6 +38,11 @@ class Drawer:
         operator.go_to("paths")
         operator.sees(PANEL, "No path yet")
 
+    def adds_line_and_arc(self) -> None:
+        """Put a line of a metre and an arc of 30 degrees into the editor."""
+        insert(self.operator, "line", length="1")
+        insert(self.operator, "arc", radius="2", turn="30")
+
     def _on_frame(self, frame: str | bytes) -> None:
         self._asked.append(json.loads(frame))
 
@@ -91,8 +96,7 @@ class Drawer:
 def drawer(meet: Meet, robot: Robot) -> Drawer:
     """Somebody whose path of a line of a metre and an arc can be driven, and saved."""
     drawer = Drawer(meet(), robot)
-    insert(drawer.operator, "line", length="1")
-    insert(drawer.operator, "arc", radius="2", turn="30")
+    drawer.adds_line_and_arc()
     drawer.page.get_by_label("Name").fill("boxes")
     drawer.sees_drivable()
     return drawer

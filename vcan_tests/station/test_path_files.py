@@ -20,7 +20,7 @@ from vcan_tests.station.browser import Operator
 from vcan_tests.station.conftest import Meet
 from vcan_tests.station.processes import Fleet, Robot
 from vcan_tests.station.test_path_boxes import Drawer
-from vcan_tests.station.test_paths import PANEL, insert, press
+from vcan_tests.station.test_paths import PANEL, press
 
 pytestmark = pytest.mark.station
 
@@ -52,8 +52,7 @@ def driven(path: Any, *, backward: bool) -> list[Piece]:
 def drawer(meet: Meet, robot: Robot) -> Drawer:
     """Somebody whose path of a line and an arc the other way is to be driven backwards."""
     drawer = Drawer(meet(), robot)
-    insert(drawer.operator, "line", length="1")
-    insert(drawer.operator, "arc", radius="2", turn="30")
+    drawer.adds_line_and_arc()
     drawer.page.get_by_label("Driving direction of piece 1").select_option("backward")
     drawer.page.get_by_label("backwards").check()
     drawer.page.get_by_label("Name").fill("turned")
