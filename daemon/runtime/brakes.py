@@ -38,8 +38,9 @@ class BrakeKeeper:
 
     def follow(self, release: tuple[bool, ...]) -> None:
         """Make the steering brakes follow what the law asks for; one whose drive is gone cannot be switched."""
+        ready = NodeState.READY
         for brake, wanted in zip(self._steering, release, strict=True):
-            if self._devices.drives[brake.drive].node_state is not NodeState.READY:
+            if self._devices.drives[brake.drive].node_state is not ready:
                 continue
             if wanted and brake.state not in RELEASED:
                 self._tasks.spawn(self._switch(brake, brake.release), "brake")

@@ -66,26 +66,29 @@ class Plausibility:
             if (config := profile.drives.get(drive.name)) and config.mode != OLD_CURRENT_MODE
         )
 
-    def look(
-        self, measurement: Measurement, command: Command, dt_s: float, *, powered: bool, driving: bool
-    ) -> DeviceFault | None:
+    def jumped(self, measurement: Measurement, *, powered: bool) -> DeviceFault | None:
+        """The encoder that tells what no axis can do within a cycle, or None; ask before any law hears of it.
+
+        Args:
+            measurement: of this cycle.
+            powered: whether anything has power; what happens without is not looked at.
+        """
+        if not powered:
+            self._jumps.begin_anew()
+            return None
+        headings_rad = measurement.heading_rad[: len(self._encoders)]
+        jump = self._jumps.look(headings_rad, [encoder.reading_time_s for encoder in self._encoders])
+        return self._off(jump.index, "jumped", jump.value, jump.limit, _JUMP_REMEDY) if jump else None
+
+    def look(self, measurement: Measurement, command: Command, dt_s: float, *, driving: bool) -> DeviceFault | None:
         """The contradiction that stops the vehicle, or None.
 
         Args:
             measurement: of this cycle.
             command: that was sent before it.
             dt_s: for which it was sent.
-            powered: whether anything has power; what happens without is not looked at.
             driving: whether a law of the vehicle moves it; a person who moves single motors knows what stands against.
         """
-        if not powered:
-            self._jumps.begin_anew()
-        jump = powered and self._jumps.look(
-            measurement.heading_rad[: len(self._encoders)], [encoder.reading_time_s for encoder in self._encoders]
-        )
-        if jump:
-            return self._off(jump.index, "jumped", jump.value, jump.limit, _JUMP_REMEDY)
-        driving = powered and driving
         return (
             self._turned(measurement, command, dt_s, driving)
             or self._rolled(measurement, command, dt_s, driving)

@@ -235,23 +235,24 @@ class Supervisor:
     # --- the cycle ---------------------------------------------------------------------------------------------
 
     def step(self, now_s: float, dt_s: float) -> None:
-        """One control step: measure, watch, ask the motions, pass the gate, transmit.
+        """One control step: measure, watch the devices, ask the motions, pass the gate, transmit.
 
-        What no target has to wait for comes after that.
+        What no target has to wait for comes after that. Readings that contradict each other are among it: targets count
+        at the next SYNC, and the stop to which they lead is on the wire before.
         """
-        vehicle, halts = self.vehicle, self._stopping.halts
+        vehicle, halts, before = self.vehicle, self._stopping.halts, self.command
         measurement = self.measurement = vehicle.measure(now_s)
         powered = self.powered
         self._holding.watch()
         self._watch_devices(now_s, powered=powered)
-        self._watch_readings(measurement, dt_s, powered=powered)
+        self._stop_for(self._plausibility.jumped(measurement, powered=powered and not self._stopping.latched))
         wanted = self._ask_motions(measurement, dt_s)
-        command, self.active_limits = vehicle.gate(wanted, measurement, self.command, dt_s)
-        self.command = command
-        self._transmit(command, now_s + self._stale_s)
+        self.command, self.active_limits = vehicle.gate(wanted, measurement, self.command, dt_s)
+        self._transmit(self.command, now_s + self._stale_s)
         vehicle.observe(measurement)
-        if command.release_brake:
-            self.brakes.follow(command.release_brake)
+        self._watch_readings(measurement, before, dt_s, powered=powered)
+        if self.command.release_brake:
+            self.brakes.follow(self.command.release_brake)
         self._rolling.look(now_s, powered=powered)
         if halts == self._stopping.halts:  # of a stop that has just been commanded these readings tell nothing
             self._stopping.rest.look((*measurement.wheel_speed_m_s, *[drive.speed_m_s for drive in vehicle.aside]))
@@ -287,16 +288,16 @@ class Supervisor:
         if not self._stopping.estop_reason and (pressed := self._stopping.pressed):
             self.estop(pressed)
         if not self._stopping.latched:
-            fault = self._watch.look(now_s, powered=powered)
-            if fault is not None:
-                self.fault(fault)
+            self._stop_for(self._watch.look(now_s, powered=powered))
 
-    def _watch_readings(self, measurement: Measurement, dt_s: float, *, powered: bool) -> None:
-        powered = powered and not self._stopping.latched
-        driving = powered and any(motion.kind in self.vehicle.methods for motion in self.motions.values())
-        fault = self._plausibility.look(measurement, self.command, dt_s, powered=powered, driving=driving)
+    def _stop_for(self, fault: DeviceFault | None) -> None:
         if fault is not None:
             self.fault(fault)
+
+    def _watch_readings(self, measurement: Measurement, before: Command, dt_s: float, *, powered: bool) -> None:
+        powered = powered and not self._stopping.latched
+        driving = powered and any(motion.kind in self.vehicle.methods for motion in self.motions.values())
+        self._stop_for(self._plausibility.look(measurement, before, dt_s, driving=driving))
 
     def _on_node_event(self, event: NodeEvent) -> None:
         self.log.add(event.severity, event.name or f"node {event.node}", event.message, event.remedy)

@@ -103,14 +103,14 @@ class Vehicle(ABC):
         return self._readings(now_s)
 
     def _readings(self, now_s: float, acceleration_m_s2: tuple[float, float] | None = None) -> Measurement:
-        drives, brakes = self.drives, self.brakes
+        drives, brakes, engaged, released = self.drives, self.brakes, BrakeState.ENGAGED, BrakeState.RELEASED
         return Measurement(
             now_s,
             tuple(map(_SPEED, drives)),
             tuple(map(_POSITION, drives)),
             tuple(map(_HEADING, self.encoders)),
-            tuple([brake.state is BrakeState.ENGAGED for brake in brakes]),
-            tuple([brake.state is BrakeState.RELEASED for brake in brakes]),
+            tuple([brake.state is engaged for brake in brakes]),
+            tuple([brake.state is released for brake in brakes]),
             acceleration_m_s2,
             tuple([sign * drive.current_a for sign, drive in self._currents]),
         )

@@ -114,6 +114,7 @@ class SocketCanBus(Bus):
         self._no_can = False
         self._link_overflowed = 0
         self._buffered_frames = 0
+        self._burst = BATCH
         self._wanted: Collection[int] | None = None
         self._heard: dict[int, FrameHandler] = {}
         self._timer: asyncio.TimerHandle | None = None
@@ -175,17 +176,22 @@ class SocketCanBus(Bus):
         return True
 
     def _on_readable(self) -> None:
-        """Take what has come, until nothing is left or a handler has closed the bus."""
+        """Take what has come, until nothing is left or a handler has closed the bus.
+
+        Who asks for one more when nothing is left pays for a refusal, so as many are taken as there were the last time;
+        what is left then is called for anew.
+        """
         link = self._link
         if link is None:
             return
         self._now_s = now_s = self._loop.time()
         self._wall_to_loop_s = now_s - time.time()
         receive, take = link.recvmsg, self._take
-        for _ in range(BATCH):
+        for taken in range(self._burst):
             try:
                 packet, ancillary, flags, _ = receive(LONGEST_PACKET_BYTES, ANCILLARY_BYTES)
             except BlockingIOError:
+                self._burst = max(taken, 1)
                 return
             except OSError as error:
                 self._lose(error)
@@ -193,6 +199,7 @@ class SocketCanBus(Bus):
             take(packet, ancillary, flags)
             if link is not self._link:
                 return
+        self._burst = min(2 * self._burst, BATCH)
 
     def _take(self, packet: bytes, ancillary: Ancillary, flags: int) -> None:
         frame = parse_frame(packet)

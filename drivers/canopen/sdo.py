@@ -21,7 +21,12 @@ from drivers.canopen.sdo_block import (
     upload,
 )
 from drivers.canopen.sdo_frames import (
+    ABORT,
+    DOWNLOAD,
+    DOWNLOAD_SEGMENT,
     MAX_UPLOAD_BYTES,
+    UPLOAD,
+    UPLOAD_SEGMENT,
     Address,
     AnswerKind,
     SdoAnswer,
@@ -44,7 +49,7 @@ NO_ANSWER_REMEDY = "check its power, its node id and the CAN cable"
 SdoObject = ObjectDef | Address
 """An object of a table, or index and sub-index of any other, whose value is then plain bytes."""
 
-_SEGMENTS = (AnswerKind.UPLOAD_SEGMENT, AnswerKind.DOWNLOAD_SEGMENT)
+_SEGMENTS = (UPLOAD_SEGMENT, DOWNLOAD_SEGMENT)
 
 
 def _address(obj: SdoObject) -> Address:
@@ -99,7 +104,7 @@ class SdoClient:
         self._turn = asyncio.Lock()
         self._object: SdoObject = (0, 0)
         self._address: Address = (0, 0)
-        self._expected = (AnswerKind.ABORT, 0)
+        self._expected = (ABORT, 0)
         self._waiter: asyncio.Future[SdoAnswer] | None = None
 
     async def read(self, obj: SdoObject) -> int | str | bytes:
@@ -160,7 +165,7 @@ class SdoClient:
         async with self._turn:
             self._object, self._address = obj, _address(obj)
             timeout = timeout_s or self._timeout_s
-            answer = await self._exchange(make_upload(*self._address), AnswerKind.UPLOAD, 0, timeout)
+            answer = await self._exchange(make_upload(*self._address), UPLOAD, 0, timeout)
             if answer.last:
                 size = obj.type.bits // 8 if isinstance(obj, ObjectDef) else 0
                 return answer.data[: size or 4] if not answer.sized else answer.data
@@ -175,7 +180,7 @@ class SdoClient:
             timeout = timeout_s or self._timeout_s
             if self.blocks and len(data) >= BLOCK_FROM_BYTES and await self._download_blocks(data, timeout):
                 return
-            await self._exchange(make_download(*self._address, data), AnswerKind.DOWNLOAD, 0, timeout)
+            await self._exchange(make_download(*self._address, data), DOWNLOAD, 0, timeout)
             if not 1 <= len(data) <= 4:
                 await self._download_segments(data, timeout)
 
@@ -183,7 +188,7 @@ class SdoClient:
         value, toggle, last = bytearray(), 0, False
         while not last:
             request = make_upload_segment(toggle)
-            answer = await self._segment(request, AnswerKind.UPLOAD_SEGMENT, toggle, timeout_s)
+            answer = await self._segment(request, UPLOAD_SEGMENT, toggle, timeout_s)
             value += answer.data
             if len(value) > MAX_UPLOAD_BYTES:
                 self._abort(ABORT_OUT_OF_MEMORY)
@@ -195,7 +200,7 @@ class SdoClient:
         toggle = 0
         for start in range(0, max(len(data), 1), 7):
             request = make_download_segment(data[start : start + 7], toggle, start + 7 >= len(data))
-            await self._segment(request, AnswerKind.DOWNLOAD_SEGMENT, toggle, timeout_s)
+            await self._segment(request, DOWNLOAD_SEGMENT, toggle, timeout_s)
             toggle ^= 1
 
     async def _upload_blocks(self, timeout_s: float) -> bytes:
@@ -207,7 +212,7 @@ class SdoClient:
             self.blocks = False
             return await self._upload_segments(timeout_s)
         if value is None:
-            await self._exchange(make_upload(*self._address), AnswerKind.UPLOAD, 0, timeout_s)
+            await self._exchange(make_upload(*self._address), UPLOAD, 0, timeout_s)
             return await self._upload_segments(timeout_s)
         return value
 
@@ -272,7 +277,7 @@ class SdoClient:
         finally:
             timer.cancel()
             self._waiter = None
-        if answer.kind is AnswerKind.ABORT:
+        if answer.kind is ABORT:
             raise self._aborted(answer.code)
         return answer
 
@@ -290,7 +295,7 @@ class SdoClient:
             self._waiter.set_result(answer)
 
     def _fits(self, answer: SdoAnswer) -> bool:
-        if answer.kind is AnswerKind.ABORT:
+        if answer.kind is ABORT:
             return answer.address == self._address
         kind, toggle = self._expected
         if answer.kind is not kind:

@@ -28,6 +28,8 @@ class AnswerKind(IntEnum):
     ABORT = 4
 
 
+UPLOAD_SEGMENT, DOWNLOAD_SEGMENT, UPLOAD, DOWNLOAD, ABORT = AnswerKind
+"""Looked up once: in Python 3.11 that takes 0.1 us each time."""
 _KINDS = (*AnswerKind, None, None, None)
 """By the command specifier; the last three are none of an answer."""
 
@@ -86,7 +88,7 @@ def parse_answer(data: bytes) -> SdoAnswer | None:
         return None
     command, index, sub, value = _unpack(data)
     kind = _KINDS[command >> 5]
-    if kind is AnswerKind.UPLOAD:
+    if kind is UPLOAD:
         expedited, sized = command & 2 != 0, command & 1 != 0
         if expedited and sized:
             value = value[: 4 - (command >> 2 & 3)]
@@ -94,9 +96,9 @@ def parse_answer(data: bytes) -> SdoAnswer | None:
     if kind is None:
         return None
     toggle = command >> 4 & 1
-    if kind is AnswerKind.UPLOAD_SEGMENT:
+    if kind is UPLOAD_SEGMENT:
         return SdoAnswer(kind, toggle=toggle, data=data[1 : 8 - (command >> 1 & 7)], last=command & 1 != 0)
-    if kind is AnswerKind.DOWNLOAD_SEGMENT:
+    if kind is DOWNLOAD_SEGMENT:
         return SdoAnswer(kind, toggle=toggle)
-    code = int.from_bytes(value, "little") if kind is AnswerKind.ABORT else 0
+    code = int.from_bytes(value, "little") if kind is ABORT else 0
     return SdoAnswer(kind, (index, sub), code=code)

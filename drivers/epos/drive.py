@@ -33,6 +33,8 @@ SENSOR_ERROR = 0x7320
 INSIST_CYCLES = 5
 """Cycles in which a drive has to show that it takes a quick stop, or that it is off."""
 _unpack_tpdo1, _pack_rpdo1 = TPDO1.unpack, RPDO1.pack
+_UNKNOWN, _ENABLED, _READY = DriveState.UNKNOWN, DriveState.ENABLED, NodeState.READY
+"""For what is done each cycle: in Python 3.11 to look up a member of an enum takes 0.1 us."""
 
 
 class EposDrive(CanopenDevice):
@@ -102,7 +104,7 @@ class EposDrive(CanopenDevice):
         self.reading_time_s = timestamp
         self.position_m, self.speed_m_s = travel.position_m, travel.speed_m_s
         self.current_a = current_ma * 1e-3
-        if statusword != self.statusword or self.state is DriveState.UNKNOWN:
+        if statusword != self.statusword or self.state is _UNKNOWN:
             self._on_statusword(statusword)
         if self.waiters:
             self.waiters.take(statusword)
@@ -131,7 +133,7 @@ class EposDrive(CanopenDevice):
 
     def command_speed(self, speed_m_s: float) -> None:
         """Take a target speed at the rim for the next :meth:`transmit`; zero unless enabled in the driving mode."""
-        if self.state is not DriveState.ENABLED or self.mode is not self.driving_mode or speed_m_s != speed_m_s:
+        if self.state is not _ENABLED or self.mode is not self.driving_mode or speed_m_s != speed_m_s:
             speed_m_s = 0.0
         elif abs(speed_m_s) > self._top_speed_m_s:
             speed_m_s = math.copysign(self._top_speed_m_s, speed_m_s)
@@ -140,7 +142,7 @@ class EposDrive(CanopenDevice):
 
     def transmit(self, deadline_s: float) -> None:
         """Send controlword and target of this cycle."""
-        if self.node_state is NodeState.READY:
+        if self.node_state is _READY:
             self._send(self._rpdo1, _pack_rpdo1(self._controlword, self._target_rpm), deadline_s)
 
     def _command(self, controlword: int) -> None:
