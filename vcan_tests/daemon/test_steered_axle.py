@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
+import random
+from collections.abc import Iterator
 
 import pytest
 from hypothesis import given
@@ -15,6 +17,7 @@ from profiles.steered import SteeredAxle
 
 DT = 0.01
 ARM_M = 0.1
+ASKED_M_S = 0.104
 AXLE = SteeredAxle(
     drive="steering", encoder="steering", limit_deg=32, stop_deg=35, rate_deg_s=60, acceleration_deg_s2=600
 )
@@ -97,3 +100,36 @@ def test_at_a_stop_the_gate_lets_the_axle_turn_back_only(side: int) -> None:
     gate, stop = SteeringGate(AXLE, ARM_M), side * math.radians(35)
     assert gate.apply(side * 0.01, stop, side * 0.01, DT)[0] == 0.0
     assert gate.apply(-side * 0.01, stop, -side * 0.01, DT)[0] == -side * 0.01
+
+
+def pushed(gate: SteeringGate, axle: Axle, noise_rad: Iterator[float], steps: int = 500) -> list[float]:
+    """Speeds that a gate sends while a person asks for as much as there is."""
+    sent = [0.0]
+    for _ in range(steps):
+        sent.append(gate.apply(ASKED_M_S, axle.angle_rad + next(noise_rad), sent[-1], DT)[0])
+        axle.turn(sent[-1] / ARM_M)
+    return sent
+
+
+def noise(seed: int) -> Iterator[float]:
+    """Of an encoder, a tenth of a degree."""
+    dice = random.Random(seed)
+    while True:
+        yield dice.gauss(0.0, math.radians(0.1))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_who_pushes_towards_a_stop_comes_to_rest_before_it_and_stays_there(seed: int) -> None:
+    gate, axle = SteeringGate(AXLE, ARM_M), Axle(math.radians(-20))
+    sent = pushed(gate, axle, noise(seed))
+    at_rest = sent.index(0.0, 1)
+    assert max(sent) == ASKED_M_S
+    assert set(sent[at_rest:]) == {0.0}
+    assert math.radians(32) < axle.angle_rad < math.radians(35)
+
+
+def test_an_axle_that_is_held_goes_on_when_it_is_back_within_the_limit() -> None:
+    gate, axle = SteeringGate(AXLE, ARM_M), Axle()
+    pushed(gate, axle, itertools.repeat(0.0))
+    assert gate.apply(0.05, math.radians(32.5), 0.0, DT)[0] == 0.0
+    assert gate.apply(0.05, math.radians(31.5), 0.0, DT)[0] > 0.0
