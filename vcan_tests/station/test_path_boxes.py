@@ -130,6 +130,8 @@ def test_a_box_that_held_nonsense_and_is_emptied_counts_as_empty(drawer: Drawer)
     [
         (LENGTH, "-1", "give at least 0.01"),
         (LENGTH, "", "give a number"),
+        (LENGTH, "1,2,3", "this is no number"),
+        (RADIUS, "1.5.2", "this is no number"),
         (RADIUS, "0", "give at least 0.01"),
         (TURN, "0", "an arc turns"),
         (TURN, "4000", "give at most 3600"),
@@ -180,6 +182,18 @@ def test_a_number_that_is_half_typed_is_not_yet_wrong(drawer: Drawer) -> None:
     drawer.page.keyboard.press("Tab")
     drawer.sees_drivable()
     assert drawer.box(SPEED).input_value() == "0.05"
+
+
+def test_a_decimal_comma_is_a_decimal_point(drawer: Drawer) -> None:
+    drawer.writes(LENGTH, "1,5")
+    drawer.writes(RADIUS, "2,25")
+    drawer.sees_drivable()
+    assert [drawer.box(label).input_value() for label in (LENGTH, RADIUS)] == ["1.5", "2.25"]
+    drawer.types(SPEED, "0,05")
+    drawer.page.click("#path-drive")
+    drawer.operator.until(drawer.drives, lambda: "nothing was sent")
+    (asked,) = drawer.drives()
+    assert (asked["speed_m_s"], asked["path"]["pieces"][0]["line_m"]) == (0.05, 1.5)
 
 
 def test_driving_right_after_typing_takes_what_was_typed(drawer: Drawer) -> None:

@@ -2,6 +2,7 @@
 
 import { badge, setBadge } from "./badge.js";
 import { allow, h, text } from "./dom.js";
+import { field, numberIn, settleWriting, wrongIn } from "./fields.js";
 import { Rows, table } from "./rows.js";
 
 const STATES = { waiting: "muted", acting: "bad", over: "good" };
@@ -9,6 +10,7 @@ const STATES = { waiting: "muted", acting: "bad", over: "good" };
 const CODES = ["cob_id", "code", "value"];
 /** Fields that say which frames and when, more finely than most people ask. */
 const FINE = ["at_s", "at_frame", "nth", "times", "probability", "cob_id", "object"];
+const NUMBERS = ["number", "integer"];
 const TOLD_APART = ["fault", "kind", "part", "state", "struck"];
 
 /** The faults that were set, each with a button that takes it away. */
@@ -140,37 +142,47 @@ export class FaultForm {
   #field(name, { parts, needs }) {
     const { doc, unit } = this.#fields[name];
     const needed = needs.includes(name);
-    const input = name === "part" ? partInput(this.#partsOf(parts), needed) : this.#input(name, needed);
     const hint = h("small", { id: `fault-${name}` }, doc);
-    input.setAttribute("aria-describedby", hint.id);
+    const told = `${name.replace(/_(s|deg)$/, "").replaceAll("_", " ")}${unit ? ` (${unit})` : ""}`;
+    const label = needed ? `${told} (needed)` : told;
+    const attributes = { required: needed, "aria-describedby": hint.id };
+    const input = name === "part" ? partInput(this.#partsOf(parts), attributes) : this.#input(name, label, attributes);
     this.#inputs.set(name, input);
-    const label = `${name.replace(/_(s|deg)$/, "").replaceAll("_", " ")}${unit ? ` (${unit})` : ""}`;
-    return h("div", { class: "field" }, h("label", {}, needed ? `${label} (needed) ` : `${label} `, input), hint);
+    return h("div", { class: "field" }, h("label", {}, `${label} `, input), hint);
   }
 
-  #input(name, required) {
+  #input(name, label, attributes) {
     const { type, minimum, maximum } = this.#fields[name];
-    if (type === "string" || CODES.includes(name)) {
-      const pattern = CODES.includes(name) ? "0x[0-9A-Fa-f]+|[0-9]+" : null;
-      return h("input", { type: "text", required, pattern, autocomplete: "off", spellcheck: "false" });
+    if (this.#isNumber(name)) {
+      return field(label, { min: minimum, max: maximum, whole: type === "integer", ...attributes }, () => {});
     }
-    return h("input", { type: "number", required, min: minimum, max: maximum, step: type === "integer" ? 1 : "any" });
+    const pattern = CODES.includes(name) ? "0x[0-9A-Fa-f]+|[0-9]+" : null;
+    return h("input", { type: "text", pattern, autocomplete: "off", spellcheck: "false", ...attributes });
+  }
+
+  #isNumber(name) {
+    return NUMBERS.includes(this.#fields[name].type) && !CODES.includes(name);
   }
 
   async #ask() {
+    settleWriting();
+    if (wrongIn(this.#fine)) this.#details.open = true;
+    if (wrongIn(this.element)) return;
     const asked = { kind: this.#kind.value };
-    for (const [name, input] of this.#inputs) if (input.value) asked[name] = this.#valueOf(name, input.value.trim());
+    for (const [name, input] of this.#inputs) if (input.value) asked[name] = this.#valueOf(name, input);
     const set = await this.#station.attempt(this.#station.call("simulation.fault", asked), `fault ${asked.kind}`);
     if (set) this.#station.say(`fault ${set.fault} (${set.kind}) is ${set.state}`);
     this.#changed();
   }
 
-  #valueOf(name, written) {
-    return ["number", "integer"].includes(this.#fields[name].type) ? Number(written) : written;
+  #valueOf(name, input) {
+    if (this.#isNumber(name)) return numberIn(input);
+    const written = input.value.trim();
+    return NUMBERS.includes(this.#fields[name].type) ? Number(written) : written;
   }
 }
 
-function partInput(names, required) {
+function partInput(names, { required, ...attributes }) {
   const any = required ? [] : [h("option", { value: "" }, "any")];
-  return h("select", {}, any, names.map((name) => h("option", { value: name }, name)));
+  return h("select", attributes, any, names.map((name) => h("option", { value: name }, name)));
 }

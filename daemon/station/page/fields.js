@@ -1,6 +1,7 @@
 /** Boxes for numbers and choices: only good values are told, and what is wrong with others stands beside the box. */
 
 import { attribute, h, text } from "./dom.js";
+import { againstUnclear, parsed } from "./numbers.js";
 
 /** What is known of each box for a number: `agreed` is the text that it shared last with whoever owns the value. */
 const boxes = new WeakMap();
@@ -11,16 +12,29 @@ let made = 0;
  * `judged`, as it does when it is good again.
  *
  * @param label for people.
- * @param limits attributes such as min and max.
+ * @param limits `min`, `max` and `whole` of the number, and attributes such as `required`.
  * @param change is given the number; null for an empty box, where `limits.required` does not forbid that.
  * @param against why a number within the limits is no good one; "" where it is.
  */
-export function field(label, limits, change, against = () => "") {
-  const input = h("input", { type: "number", inputmode: "decimal", step: "any", "aria-label": label, ...limits });
+export function field(label, { min, max, whole, ...attributes }, change, against = () => "") {
+  const written = { type: "text", inputmode: "decimal", autocomplete: "off", spellcheck: "false" };
+  const input = h("input", { ...written, "aria-label": label, ...attributes });
   made += 1;
-  boxes.set(input, { agreed: "", note: h("span", { class: "wrong", id: `wrong-${made}` }), against, change });
+  const note = h("span", { class: "wrong", id: `wrong-${made}` });
+  const hint = input.getAttribute("aria-describedby");
+  boxes.set(input, { agreed: "", note, hint, limits: { min, max, whole }, against, change });
   for (const kind of ["change", "blur"]) input.addEventListener(kind, () => settle(input));
   return input;
+}
+
+/** Let a box have other limits, `min` and `max`. */
+export function limit(input, limits) {
+  Object.assign(boxes.get(input).limits, limits);
+}
+
+/** The number in a box; null in an empty one. */
+export function numberIn(input) {
+  return input.value === "" ? null : parsed(input.value);
 }
 
 /** One of several values with their names. */
@@ -70,33 +84,37 @@ function isWrong(input) {
   return input.getAttribute("aria-invalid") === "true";
 }
 
-/** A browser that takes nonsense for empty tells of no change: so this is asked for when the box is left, too. */
+/** What was taken stands in the box as the page writes it: what was `1,5` is `1.5` from then on. */
 function settle(input) {
   const box = boxes.get(input);
-  const untouched = input.value === box.agreed && !input.validity.badInput;
+  const untouched = input.value === box.agreed;
   const words = untouched ? "" : wordsAgainst(input);
   mark(input, words);
   if (untouched || words) return;
-  box.agreed = input.value;
-  box.change(input.value === "" ? null : input.valueAsNumber);
+  const value = numberIn(input);
+  input.value = box.agreed = String(value ?? "");
+  box.change(value);
 }
 
 function mark(input, words) {
-  const { note } = boxes.get(input);
+  const { note, hint } = boxes.get(input);
   if (words === note.textContent) return;
   if (!note.isConnected) input.after(note);
   text(note, words);
   attribute(input, "aria-invalid", words ? "true" : null);
-  attribute(input, "aria-describedby", words ? note.id : null);
+  attribute(input, "aria-describedby", words ? [hint, note.id].filter(Boolean).join(" ") : hint);
   input.dispatchEvent(new Event("judged", { bubbles: true }));
 }
 
 function wordsAgainst(input) {
-  const { validity, min, max, required, value, valueAsNumber } = input;
-  const orEmpty = required ? "" : ", or leave it empty";
-  if (validity.badInput) return "this is no number";
-  if (validity.valueMissing) return "give a number";
-  if (validity.rangeUnderflow) return `give at least ${min}${orEmpty}`;
-  if (validity.rangeOverflow) return `give at most ${max}${orEmpty}`;
-  return value === "" ? "" : boxes.get(input).against(valueAsNumber);
+  const { limits, against } = boxes.get(input);
+  const { min, max, whole } = limits;
+  if (input.value === "") return input.required ? "give a number" : "";
+  const value = parsed(input.value);
+  const orEmpty = input.required ? "" : ", or leave it empty";
+  if (!Number.isFinite(value)) return "this is no number";
+  if (whole && !Number.isInteger(value)) return `give a whole number${orEmpty}`;
+  if (value < (min ?? -Infinity)) return `give at least ${min}${orEmpty}`;
+  if (value > (max ?? Infinity)) return `give at most ${max}${orEmpty}`;
+  return againstUnclear(input.value) || against(value);
 }

@@ -1,8 +1,8 @@
 /** The floor of the simulation: its slope, and ice under the wheels. */
 
 import { badge, setBadge } from "./badge.js";
-import { allow, attribute, h, text } from "./dom.js";
-import { field, put, settleWriting, wrongIn } from "./fields.js";
+import { allow, h, text } from "./dom.js";
+import { field, limit, numberIn, put, settleWriting, wrongIn } from "./fields.js";
 import { Rows, table } from "./rows.js";
 
 /** Rubber on wet ice. */
@@ -46,8 +46,7 @@ export class Slope {
     for (const control of [this.#slope, this.#direction, this.#tilt, this.#level]) allow(control, reason);
     text(this.#why, reason ? `Slope: ${reason}` : "");
     const param = this.#station.methods.get("simulation.slope")?.params.find(({ name }) => name === "slope_deg");
-    attribute(this.#slope, "min", param?.minimum);
-    attribute(this.#slope, "max", param?.maximum);
+    limit(this.#slope, { min: param?.minimum, max: param?.maximum });
   }
 
   /** @param {{slope_deg: number, direction_deg: number}|undefined} floor as `simulation.look` tells it */
@@ -65,7 +64,7 @@ export class Slope {
   async #ask() {
     settleWriting();
     if (wrongIn(this.element)) return;
-    const asked = { slope_deg: Number(this.#slope.value), direction_deg: Number(this.#direction.value) };
+    const asked = { slope_deg: numberIn(this.#slope), direction_deg: numberIn(this.#direction) };
     await this.#station.attempt(this.#station.call("simulation.slope", asked), "tilting the floor");
     this.#changed();
   }
@@ -135,7 +134,7 @@ export class Ice {
   async #lay(wheels) {
     settleWriting();
     if (wrongIn(this.element)) return;
-    const friction = Number(this.#friction.value);
+    const friction = numberIn(this.#friction);
     const lay = ({ name }) => this.#station.call("simulation.fault", { kind: "ice", part: name, friction });
     const ended = await Promise.allSettled(wheels.map(lay));
     const failed = ended.filter(({ status }) => status === "rejected").map(({ reason }) => reason);

@@ -1,7 +1,7 @@
 /** Turning one motor by hand: as long as a button is held, and no longer. */
 
 import { allow, attribute, h } from "./dom.js";
-import { field, put, settleWriting, wrongIn } from "./fields.js";
+import { field, numberIn, put, settleWriting, wrongIn } from "./fields.js";
 
 /** Time after which a motor stops, however long its button is held. */
 const LONGEST_S = 10;
@@ -62,7 +62,7 @@ export class Jog {
   async #press(direction) {
     settleWriting();
     if (this.#held || wrongIn(this.element)) return;
-    const speed_rpm = this.#input.valueAsNumber;
+    const speed_rpm = numberIn(this.#input);
     const held = this.#hold({ direction });
     await this.#turning;
     if (held !== this.#held) return;

@@ -1,17 +1,15 @@
 /** Single motions and the brakes: each a row of inputs and a button, disabled with the reason where there is none. */
 
 import { allow, h, number, text } from "./dom.js";
+import { field, numberIn, put, settleWriting, wrongIn } from "./fields.js";
 
 const key = (name) => name.replaceAll(/[^a-z]/g, "-");
 
-/** An input for a number, with its label. */
-function field(name, label, value, { min, max, step = "any" } = {}) {
-  const input = h("input", { type: "number", id: `motion-${name}`, value, min, max, step, inputmode: "decimal" });
+/** A box for a number, with its label. */
+function box(name, label, value, limits = { required: true }) {
+  const input = field(label, { id: `motion-${name}`, ...limits }, () => {});
+  put(input, value);
   return { input, element: h("label", { class: "field", for: input.id }, label, input) };
-}
-
-function numberIn(input) {
-  return input.value.trim() === "" ? null : input.valueAsNumber;
 }
 
 /** A row that calls one method with what stands in its inputs. */
@@ -28,10 +26,11 @@ class Row {
     const inputs = h("div", { class: "row bottom" }, fields.map((each) => each.element), this.#button);
     this.#reason.id = `why-${key(method)}`;
     this.#button.setAttribute("aria-describedby", this.#reason.id);
-    this.element = h("form", { "data-motion": method }, h("h4", {}, title), inputs, this.#reason);
+    this.element = h("form", { "data-motion": method, novalidate: true }, h("h4", {}, title), inputs, this.#reason);
     this.element.addEventListener("submit", (event) => {
       event.preventDefault();
-      this.#begin(parameters());
+      settleWriting();
+      if (!wrongIn(this.element)) this.#begin(parameters());
     });
   }
 
@@ -51,12 +50,12 @@ class Row {
 
 function rows(station) {
   const pair = h("select", { id: "motion-pair" }, h("option", {}, "front"), h("option", {}, "rear"));
-  const angle = field("angle", "heading [deg]", "0");
-  const rate = field("rate", "yaw rate [deg/s]", "20");
-  const time = field("time", "time [s]", "3", { min: 0.1 });
-  const [x, y] = [field("x", "x [m]", "0.5"), field("y", "y [m]", "0")];
-  const heading = field("heading", "heading [deg]", "");
-  const speed = field("speed", "speed [m/s]", "", { min: 0.001 });
+  const angle = box("angle", "heading [°]", 0);
+  const rate = box("rate", "yaw rate [°/s]", 20);
+  const time = box("time", "time [s]", 3, { min: 0.1, required: true });
+  const [x, y] = [box("x", "x [m]", 0.5), box("y", "y [m]", 0)];
+  const heading = box("heading", "heading [°]", "", {});
+  const speed = box("speed", "speed [m/s]", "", { min: 0.001 });
   return [
     new Row(station, "steer", {
       title: "Steer a pair of wheels",
