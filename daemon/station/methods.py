@@ -31,15 +31,16 @@ async def _fault_kinds(robot: Robot, params: dict[str, Any]) -> dict[str, Any]:
 
 
 _NAME = Param("name", "string", "of the path")
+_HERE = Param("here", "object", "where the vehicle is, as the start of a path: x_m, y_m, heading_deg", default=None)
 
 _METHODS: Final[tuple[tuple[Method, Function], ...]] = (
     (Method("station.paths", "The paths that are kept.", (), "paths", Role.WATCH), paths.list_paths),
-    (Method("station.path.read", "One of them.", (_NAME,), "path", Role.WATCH), paths.read_path),
+    (Method("station.path.read", "One of them.", (_NAME, _HERE), "path", Role.WATCH), paths.read_path),
     (
         Method(
             "station.path.parse",
             "The path in a path file that the page has.",
-            (Param("file", "string", "its name, for mistakes"), Param("lines", "list", "of YAML or JSON")),
+            (Param("file", "string", "its name, for mistakes"), Param("lines", "list", "of YAML or JSON"), _HERE),
             "path",
             Role.WATCH,
         ),

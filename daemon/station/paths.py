@@ -22,7 +22,7 @@ from daemon.loops.odometry import Pose
 from daemon.runtime.path_building import PathBuilder
 from daemon.runtime.path_commands import converted
 from daemon.station.robots import Robot
-from profiles.path_file import PathSpec, PieceSpec, StartSpec, load_path_file, parse_path_file
+from profiles.path_file import PathFile, PathSpec, PieceSpec, StartSpec, load_path_file, parse_path_file
 from profiles.path_writing import path_lines
 
 PATHS: Final = "paths"
@@ -42,23 +42,23 @@ async def list_paths(robot: Robot, params: dict[str, Any]) -> dict[str, Any]:
 
 
 async def read_path(robot: Robot, params: dict[str, Any]) -> dict[str, Any]:
-    """One path.
+    """One path, whole.
 
     Raises:
         UsageError: there is none of this name, or it has a mistake; the message has file:line.
-        LimitExceeded: it is too large for a page.
+        LimitExceeded: it is too large for a page, or a piece for any vehicle.
     """
-    spec = await asyncio.to_thread(_read, _file(robot.folder / PATHS, params["name"]))
-    return {"path": msgspec.to_builtins(spec)}
+    file = await asyncio.to_thread(_read, _file(robot.folder / PATHS, params["name"]))
+    return {"path": await asyncio.to_thread(_sound, file, params.get("here"))}
 
 
 async def parse_path(robot: Robot, params: dict[str, Any]) -> dict[str, Any]:
-    """The path in a path file that a page has. Raises UsageError, with the line of the mistake."""
+    """The path in a path file that a page has. Raises UsageError, LimitExceeded, with the line of the mistake."""
     lines = params["lines"]
     if not all(isinstance(line, str) for line in lines):
         raise UsageError("a line is no text", object="lines", remedy="send the lines of the file as strings")
     file = await asyncio.to_thread(parse_path_file, "\n".join(lines), Path(params["file"]))
-    return {"path": msgspec.to_builtins(file.spec)}
+    return {"path": await asyncio.to_thread(_sound, file, params.get("here"))}
 
 
 async def write_path(robot: Robot, params: dict[str, Any]) -> dict[str, Any]:
@@ -85,27 +85,37 @@ async def delete_path(robot: Robot, params: dict[str, Any]) -> dict[str, Any]:
 def checked(path: Any) -> tuple[PathSpec, float]:
     """A path that somebody sent, and its length [m]; what is wrong with a piece is told as the loops tell it.
 
-    Every section is checked by itself: where the driving direction changes, only the vehicle's own length says where
-    the next one begins, and the daemon judges that when the path is driven.
-
     Raises:
         UsageError, LimitExceeded: ``object`` is the place, as ``pieces[3].line_m``.
     """
     spec = converted(path, PathSpec)
     if not spec.pieces:
         raise UsageError("the path is empty", object="pieces", remedy="give it at least one line or arc")
+    return spec, _built_length_m(spec, StartSpec())
+
+
+def _built_length_m(spec: PathSpec, here: StartSpec) -> float:
+    """The length of a path [m], its pieces built as for driving.
+
+    Every section is checked by itself: where the driving direction changes, only the vehicle's own length says where
+    the next one begins, and the daemon judges that when the path is driven.
+
+    Args:
+        spec: with a piece at least.
+        here: where the vehicle is: where a path without a start begins.
+
+    Raises:
+        UsageError, LimitExceeded: ``object`` is the place, as ``pieces[3]``.
+    """
+    start, from_here = spec.start or here, spec.start is None
+    begin = Pose(start.x_m, start.y_m, math.radians(start.heading_deg))
     builders: list[PathBuilder] = []
     for number, piece in enumerate(spec.pieces):
         if not builders or _turns_round(piece, builders[-1]):
-            begin = builders[-1].end if builders else _start(spec)
-            builders.append(PathBuilder(begin, 0.0, False, math.inf, math.inf, entry=number))
+            begin = builders[-1].end if builders else begin
+            builders.append(PathBuilder(begin, 0.0, False, math.inf, math.inf, from_here=from_here, entry=number))
         builders[-1].add(piece)
-    return spec, round(math.fsum(builder.finished(0.0).length_m for builder in builders), 3)
-
-
-def _start(spec: PathSpec) -> Pose:
-    start = spec.start or StartSpec()
-    return Pose(start.x_m, start.y_m, math.radians(start.heading_deg))
+    return round(math.fsum(builder.finished(0.0).length_m for builder in builders), 3)
 
 
 def _turns_round(piece: PieceSpec, before: PathBuilder) -> bool:
@@ -147,6 +157,23 @@ def _files(folder: Path) -> list[Path]:
     return [file for file in found if file.suffix == ENDING and _NAME.fullmatch(file.stem) and _is_plain(file)]
 
 
+def _sound(file: PathFile, here: Any) -> Any:
+    """What a path file says, once all its pieces have been built.
+
+    Args:
+        file: that was read.
+        here: where the vehicle is, as the start of a path; None: where the daemon began.
+
+    Raises:
+        UsageError, LimitExceeded: a piece is none, or does not join; the message has file:line.
+    """
+    try:
+        _built_length_m(file.spec, converted(here or {}, StartSpec))
+    except CanhelmError as error:
+        raise file.located(error) from None
+    return msgspec.to_builtins(file.spec)
+
+
 def _list(folder: Path) -> list[dict[str, Any]]:
     found = [(file, file.lstat()) for file in _files(folder)]
     return [
@@ -163,18 +190,18 @@ def _list(folder: Path) -> list[dict[str, Any]]:
 def _length_m(file: Path, changed_ns: int, size: int) -> float | None:
     """Of a file as it was last changed; None where it has a mistake."""
     try:
-        return checked(msgspec.to_builtins(_read(file)))[1]
+        return _built_length_m(_read(file).spec, StartSpec())
     except CanhelmError:
         return None
 
 
-def _read(file: Path) -> PathSpec:
+def _read(file: Path) -> PathFile:
     _require_kept(file)
     size = file.stat().st_size
     if size > MAX_FILE_BYTES:
         what, remedy = f"path {file.stem} is too large for a page", f"drive it by `canhelm drive path {file}`"
         raise LimitExceeded(what, value=size, limit=MAX_FILE_BYTES, remedy=remedy)
-    return load_path_file(file).spec
+    return load_path_file(file)
 
 
 def _write(file: Path, spec: PathSpec, *, replace: bool) -> None:

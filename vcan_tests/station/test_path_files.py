@@ -36,6 +36,8 @@ pieces:
   - {line_m: 1.25}
   - {drive: backward, arc_deg: -30, radius_m: 2}
 """
+HALF = "pieces:\n  - {line_m: 1.5}\n  - {arc_deg: 90}\n"
+QUESTION = f"{PANEL} .question"
 WRONG = "pieces:\n  - {line_m: 1}\n  - {line_m: long}\n"
 
 
@@ -134,6 +136,51 @@ def test_a_path_file_with_a_mistake_is_refused_with_its_line(operator: Operator)
     imports(operator, "way.yaml", WRONG.encode())
     operator.sees("#alarms", r"way\.yaml:3: pieces\[1\]\.line_m: is not a finite number")
     operator.sees(PANEL, "No path yet")
+
+
+def keeps(fleet: Fleet, robot: Robot, name: str, content: str) -> None:
+    """Put a path file among those that the station keeps for a robot."""
+    folder = fleet.folder / "state" / "canhelm" / robot.name / "paths"
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / f"{name}.yaml").write_text(content)
+
+
+@pytest.mark.parametrize("button", ["Import", "Load"])
+def test_a_path_with_a_piece_that_is_none_is_refused_whole_and_the_editor_stays_as_it_is(
+    operator: Operator, fleet: Fleet, robot: Robot, button: str
+) -> None:
+    keeps(fleet, robot, "half", HALF)
+    operator.go_to("paths")
+    imports(operator, "way.yaml", WAY.encode())
+    operator.sees(PANEL, "way.yaml is in the editor")
+    if button == "Import":
+        imports(operator, "half.yaml", HALF.encode())
+    else:
+        operator.page.select_option("#path-kept", "half")
+        press(operator, "Load")
+    operator.sees("#alarms", r"half\.yaml:3: piece 1: arc_deg 90 has neither radius_m nor centre_m")
+    assert operator.page.get_by_label("Length of piece 0").input_value() == "1.25"
+    assert operator.page.get_by_label("Name").input_value() == "way"
+
+
+@pytest.mark.parametrize("change", ["Import", "Load", "Clear", "Name"])
+def test_the_question_whether_to_replace_a_path_is_withdrawn_with_what_it_was_asked_for(
+    operator: Operator, fleet: Fleet, robot: Robot, change: str
+) -> None:
+    keeps(fleet, robot, "one", WAY)
+    operator.go_to("paths")
+    operator.page.select_option("#path-kept", "one")
+    press(operator, "Load")
+    operator.sees(PANEL, "one is in the editor")
+    press(operator, "Save")
+    operator.sees(QUESTION, "Replace the path one?")
+    if change == "Import":
+        imports(operator, "other.yaml", b"pieces: [{line_m: 7}]")
+    elif change == "Name":
+        operator.page.get_by_label("Name").fill("two")
+    else:
+        press(operator, change)
+    operator.page.locator(QUESTION).wait_for(state="hidden")
 
 
 def test_a_file_that_no_message_holds_is_refused_in_words(operator: Operator) -> None:

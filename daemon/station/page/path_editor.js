@@ -174,19 +174,20 @@ class PathEditor extends EventTarget {
   }
 
   /** Take over a path of any form, to be driven as it is written; points and waypoints become lines and arcs that join.
-   *  Returns what is lost by that, for people, or "". */
+   *  Returns {taken, lost}: a path with a piece that this vehicle has no place for is not taken; what is lost, for
+   *  people, or "". */
   load(path) {
     const { pieces, broken, gap_m, kink_rad } = build(path, this.here(), { lead_m: this.lead_m });
+    if (broken !== null) return { taken: false, lost: `piece ${broken} is none for this vehicle: nothing is taken over` };
     const entries = pieces.slice(0, MOST_PIECES).map((piece) => made(asEntry(piece)));
     const { description = "", start = null } = path;
     this.chosen = null;
     this.edit((state) =>
       Object.assign(state, { description, start: start && fullStart(start), entries, exchanged: false }),
     );
-    if (pieces.length > MOST_PIECES) return `only its first ${MOST_PIECES} pieces are here`;
-    if (broken !== null) return `piece ${broken} is none, so the pieces from there on are left out`;
+    if (pieces.length > MOST_PIECES) return { taken: true, lost: `only its first ${MOST_PIECES} pieces are here` };
     const joins = gap_m <= MAX_GAP_M && kink_rad <= MAX_KINK_RAD;
-    return joins ? "" : "its pieces did not join; here each begins where the one before it ends";
+    return { taken: true, lost: joins ? "" : "its pieces did not join; here each begins where the one before it ends" };
   }
 
   // --- pieces ---------------------------------------------------------------------------------------------------

@@ -17,7 +17,7 @@ export class PathFiles {
   constructor(station, editor, check) {
     [this.station, this.editor, this.check] = [station, editor, check];
     this.select = h("select", { id: "path-kept", onchange: () => this.show() });
-    this.name = h("input", { type: "text", pattern: NAME, maxlength: 60, oninput: () => this.show() });
+    this.name = h("input", { type: "text", pattern: NAME, maxlength: 60, oninput: () => this.#renamed() });
     this.file = h("input", { type: "file", accept: ".yaml,.yml,.json", hidden: true, onchange: () => this.#import() });
     this.question = new Question("Confirm");
     this.buttons = {
@@ -116,17 +116,25 @@ export class PathFiles {
 
   async #load() {
     const name = this.select.value;
-    const answer = await this.station.attempt(this.station.call("station.path.read", { name }), `Path ${name}`);
-    if (!answer) return;
-    this.name.value = name;
-    this.#take(answer.path, `${name} is in the editor.`);
+    const call = this.station.call("station.path.read", { name, here: this.editor.here() });
+    const answer = await this.station.attempt(call, `Path ${name}`);
+    if (answer) this.#take(answer.path, name, `${name} is in the editor.`);
   }
 
-  #take(path, told) {
+  /** Put a path into the editor, whole or not at all; what was asked about the one before it is withdrawn. */
+  #take(path, name, told) {
     const turned = this.editor.exchanged ? " It is driven as it is written: forwards is chosen again." : "";
-    const lost = this.editor.load(path);
+    const { taken, lost } = this.editor.load(path);
+    if (!taken) return this.station.say(`Path: ${lost}`, "error", "drive it by `canhelm drive path`, which tells why");
     if (lost) this.station.say(`Path: ${lost}`, "warning", "look at it on the map before it is driven");
-    text(this.told, `${told}${turned}`);
+    this.name.value = name;
+    this.#renamed();
+    return text(this.told, `${told}${turned}`);
+  }
+
+  #renamed() {
+    this.question.close();
+    this.show();
   }
 
   #save() {
@@ -167,11 +175,12 @@ export class PathFiles {
     if (!file) return null;
     const content = await shortText(file);
     if (content === null) return this.station.say(`${file.name} is too long for a page`, "error", TOO_LONG);
-    const call = this.station.call("station.path.parse", { file: file.name, lines: content.split("\n") });
+    const params = { file: file.name, lines: content.split("\n"), here: this.editor.here() };
+    const call = this.station.call("station.path.parse", params);
     const answer = await this.station.attempt(call, "Import");
     if (!answer) return null;
-    this.name.value = file.name.replace(/\.\w+$/, "").replace(/[^A-Za-z0-9_-]/g, "-");
-    return this.#take(answer.path, `${file.name} is in the editor.`);
+    const name = file.name.replace(/\.\w+$/, "").replace(/[^A-Za-z0-9_-]/g, "-");
+    return this.#take(answer.path, name, `${file.name} is in the editor.`);
   }
 
   /** JSON is YAML, too: `canhelm drive path` reads it. */
@@ -209,7 +218,7 @@ export class PathFiles {
     if (!answer) return text(this.told, "Nothing was recorded.");
     const { path, length_m, pieces, trouble } = answer;
     if (trouble) this.station.say(`The recorded way is not whole: ${trouble}`, "warning");
-    this.#take(path, `The recorded way is in the editor: ${length_m.toFixed(2)} m, ${pieces} pieces.`);
+    this.#take(path, this.name.value, `The recorded way is in the editor: ${length_m.toFixed(2)} m, ${pieces} pieces.`);
     return this.#warn("The recorded way is in the editor");
   }
 

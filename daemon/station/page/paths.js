@@ -66,7 +66,7 @@ class PathsPanel {
     const { editor } = this;
     this.undo = button("Undo", () => editor.undo());
     this.redo = button("Redo", () => editor.redo());
-    this.clear = button("Clear", () => editor.clear());
+    this.clear = button("Clear", () => this.#begin());
     this.snap = h("input", { type: "checkbox", onchange: () => editor.set("snaps", this.snap.checked) });
     const line = button("Insert a line", () => editor.insert("line"));
     const arc = button("Insert an arc", () => editor.insert("arc"));
@@ -80,6 +80,12 @@ class PathsPanel {
       h("label", { class: "tick" }, this.snap, `Snap to ${SNAP_M} m and ${SNAP_DEG}°`),
       h("p", { class: "muted" }, HINT),
     );
+  }
+
+  /** Begin a new path; what was asked about the one before it is withdrawn. */
+  #begin() {
+    this.files.question.close();
+    this.editor.clear();
   }
 
   #listen() {

@@ -72,6 +72,13 @@ async def test_a_file_that_was_edited_wrongly_has_no_length_and_says_where_it_is
         await read(robot, "corner")
 
 
+async def test_a_kept_path_with_a_piece_that_is_none_is_refused_with_its_line(robot: Robot) -> None:
+    await write(robot, "corner")
+    (robot.folder / "paths" / "corner.yaml").write_text("pieces:\n  - {line_m: 1}\n  - {arc_deg: 90}\n")
+    with pytest.raises(UsageError, match=r"corner\.yaml:3: piece 1: arc_deg 90 has neither radius_m nor centre_m"):
+        await read(robot, "corner")
+
+
 @pytest.mark.parametrize(
     "name", ["", "..", "../up", "a/b", "/etc/passwd", "a.yaml", ".hidden", "-x", "a\n", "a" * 61, "ä", "a\0b"]
 )
@@ -196,6 +203,13 @@ async def test_a_path_file_of_a_page_is_read_as_one_of_this_machine(robot: Robot
         (["pieces: [", "{line_m: 1"], r"way\.yaml:3: YAML"),
         ([], r"way\.yaml:1: the path is empty"),
         (["pieces: [{line_m: 1}]", 7], "a line is no text"),
+        (["pieces:", "- {line_m: 1.5}", "- {arc_deg: 90}"], r"way\.yaml:3: piece 1: arc_deg 90 has neither radius_m"),
+        (["pieces:", "- {line_m: 1, arc_deg: 90, radius_m: 1}"], r"way\.yaml:2: piece 0 has line_m and arc_deg"),
+        (
+            ["start: {x_m: 1}", "pieces:", "- {from_m: [1, 0], line_m: 1}", "- {from_m: [3, 0], line_m: 1}"],
+            r"way\.yaml:4: piece 1 begins 1\.000 m beside the end of piece 0",
+        ),
+        (["pieces:", "- {line_m: 1}", "- {line_to_m: [3, 1]}"], r"way\.yaml:3: .*points count in the frame"),
     ],
 )
 async def test_a_mistake_in_a_path_file_of_a_page_is_told_with_its_line(
@@ -203,3 +217,10 @@ async def test_a_mistake_in_a_path_file_of_a_page_is_told_with_its_line(
 ) -> None:
     with pytest.raises(UsageError, match=told):
         await paths.parse_path(robot, {"file": "way.yaml", "lines": lines})
+
+
+async def test_points_of_a_path_without_a_start_are_judged_from_where_the_vehicle_is(robot: Robot) -> None:
+    lines = ["pieces:", "- {line_m: 1}", "- {line_to_m: [3, 1]}"]
+    here = {"x_m": 0.5, "y_m": 1.0, "heading_deg": 0.0}
+    told = await paths.parse_path(robot, {"file": "way.yaml", "lines": lines, "here": here})
+    assert len(told["path"]["pieces"]) == 2
