@@ -10,7 +10,7 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import msgspec
 
-from canhelm.errors import LimitExceeded, Refused, UsageError
+from canhelm.errors import LimitExceeded, UsageError
 from daemon.runtime.handlers import Handler, Params, holder, run_motion
 from daemon.runtime.motions import Motion
 from daemon.runtime.supervisor import Supervisor
@@ -120,14 +120,13 @@ class PathCommands:
         dry_run = bool(params.get("dry_run"))
         if not dry_run:
             self._supervisor.require_ready(())
+            self._supervisor.require_still(lease)
             await self.located()
         backward, law = bool(params.get("backward")), params.get("law", "cascade")
         plan = await self._vehicle.plan_path(PathRequest(spec, backward, params.get("speed_m_s"), law))
         plan.require_begin()
         if dry_run:
             return plan.summary()
-        if self._supervisor.motions:
-            raise Refused("the vehicle moves already", remedy="wait for it, or `canhelm stop`")
         if kept is not None:
             self._kept.pop(kept, None)
         return await run_motion(self._supervisor, plan.motion(holder(params, lease)), params, lease)

@@ -162,6 +162,16 @@ class Supervisor:
                 remedy="wait for its end, or end it where it runs; `canhelm stop` works at any time",
             )
 
+    def require_still(self, lease: str | None) -> None:
+        """Raise Refused where somebody else than this lease has the robot, or anything moves."""
+        self._holding.require_robot(lease)
+        for motion in self.motions.values():
+            raise self._running(motion)
+
+    def _running(self, motion: Motion) -> Refused:
+        what = f"motion {motion.identity} ({motion.kind}, {self._holding.hand(motion)}) is running"
+        return Refused(what, remedy="wait for it, `canhelm stop`, or take the robot over with --takeover (lease.take)")
+
     def admit(self, motion: Motion, lease: str | None = None) -> None:
         """Let a motion begin.
 
@@ -181,10 +191,7 @@ class Supervisor:
         self._holding.require_robot(lease)
         for other in self.motions.values():
             if set(other.drives) & set(motion.drives):
-                raise Refused(
-                    f"motion {other.identity} ({other.kind}, {self._holding.hand(other)}) is running",
-                    remedy="wait for it, `canhelm stop`, or take the robot over with --takeover (lease.take)",
-                )
+                raise self._running(other)
         self.brakes.require_released(motion.drives)
         if set(motion.drives) - {drive.name for drive in self.vehicle.aside}:
             self.vehicle.require_free(motion)

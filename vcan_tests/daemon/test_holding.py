@@ -82,6 +82,14 @@ async def test_who_does_not_have_the_robot_is_told_who_has_it_and_what_to_do() -
         assert not drive.done()
 
 
+async def test_who_has_the_robot_is_told_to_somebody_with_a_path() -> None:
+    async with two_people() as (_, alice, bob):
+        await driving(alice)
+        with pytest.raises(Refused, match="alice has the robot") as refused:
+            await bob.call("drive.path", path={"pieces": [{"line_m": 1}]})
+        assert "--takeover" in str(refused.value.remedy)
+
+
 async def test_a_motion_that_would_be_handed_to_the_daemon_is_refused_likewise() -> None:
     async with two_people() as (_, alice, bob):
         await driving(alice)
