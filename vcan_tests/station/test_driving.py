@@ -96,6 +96,35 @@ def test_the_stick_is_held_by_arrow_keys_when_it_has_the_focus(driver: Operator,
     robot.comes_to_rest(UNHELD_S)
 
 
+@pytest.mark.parametrize("hand", [".stick", "#slider-speed"])
+def test_no_key_drives_by_what_a_mouse_has_used(driver: Operator, robot: Robot, hand: str) -> None:
+    driver.pulls(hand, right=0.0, up=0.3)
+    driver.page.mouse.up()
+    robot.comes_to(lambda status: not status["motions"])
+    for key in ("ArrowUp", "ArrowRight", "w"):
+        driver.page.keyboard.down(key)
+        driver.catches_up()
+        assert (key, robot.status()["motions"]) == (key, [])
+        driver.page.keyboard.up(key)
+
+
+def test_letters_drive_by_no_stick_that_has_the_focus_but_by_the_keyboard_that_is_on(
+    driver: Operator, robot: Robot
+) -> None:
+    driver.page.focus(".stick")
+    driver.sees(".stick", "the arrow keys drive")
+    driver.page.keyboard.down("w")
+    driver.catches_up()
+    assert robot.status()["motions"] == []
+    driver.page.keyboard.up("w")
+    driver.page.get_by_role("button", name="Keyboard is off").click()
+    driver.page.focus(".stick")
+    driver.page.keyboard.down("w")
+    robot.comes_to(moving(0.2))
+    driver.page.keyboard.up("w")
+    robot.comes_to_rest(UNHELD_S)
+
+
 def test_a_slider_drives_only_while_it_is_held(driver: Operator, robot: Robot) -> None:
     box = driver.page.locator("#slider-speed").bounding_box()
     assert box is not None

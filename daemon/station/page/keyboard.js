@@ -5,21 +5,33 @@ import { attribute, h, text } from "./dom.js";
 const FORWARD = { ArrowUp: 1, ArrowDown: -1, KeyW: 1, KeyS: -1 };
 const LEFT = { ArrowLeft: 1, ArrowRight: -1, KeyA: 1, KeyD: -1 };
 /** Where arrows and letters have a meaning of their own. */
-const OWN_KEYS = "input, select, textarea, [contenteditable], .stick";
+const OWN_KEYS = "input, select, textarea, [contenteditable]";
+const HINTS = {
+  on: "W A S D and the arrow keys drive as long as they are held, while this panel is shown.",
+  off: "No key drives, but the arrows where Tab has led to the stick or to the speed.",
+};
+
+/** Driving keys. */
+export const ARROWS = ["ArrowUp", "ArrowDown", "ArrowLeft", "ArrowRight"];
+const ALL = [...ARROWS, "KeyW", "KeyA", "KeyS", "KeyD"];
 
 /** Which of the driving keys are held down. */
 export class HeldKeys {
   #down = new Set();
+  #codes;
   #changed;
 
-  /** @param {function(number, number, boolean): void} changed given left and forward, -1 to 1, and whether one is held */
-  constructor(changed) {
-    this.#changed = changed;
+  /**
+   * @param {string[]} codes of the keys that count
+   * @param {function(number, number, boolean): void} changed given left and forward, -1 to 1, and whether one is held
+   */
+  constructor(codes, changed) {
+    [this.#codes, this.#changed] = [codes, changed];
   }
 
   /** A key went down; one that is still down since it was dropped does not count again. */
   down(event) {
-    if (event.ctrlKey || event.altKey || event.metaKey || !isDriving(event.code)) return;
+    if (event.ctrlKey || event.altKey || event.metaKey || !this.#codes.includes(event.code)) return;
     event.preventDefault();
     event.stopPropagation();
     if (!event.repeat) this.#change(() => this.#down.add(event.code));
@@ -46,10 +58,6 @@ export class HeldKeys {
   }
 }
 
-function isDriving(code) {
-  return code in FORWARD || code in LEFT;
-}
-
 /** The switch for driving by keys, and the keys themselves. */
 export class Keyboard {
   #keys;
@@ -64,9 +72,9 @@ export class Keyboard {
     /** To the left and forward, -1, 0 or 1. */
     this.left = this.forward = 0;
     this.on = false;
-    this.#keys = new HeldKeys((left, forward, held) => this.#change(left, forward, held));
+    this.#keys = new HeldKeys(ALL, (left, forward, held) => this.#change(left, forward, held));
     this.button = h("button", { type: "button", "aria-pressed": "false", onclick: () => this.#switch(!this.on) });
-    this.hint = h("span", { class: "reason" }, "W A S D or arrow keys, held down, while this panel is shown");
+    this.hint = h("span", { class: "reason" });
     this.#switch(false);
     document.addEventListener("keydown", (event) => this.#onKey(event));
     document.addEventListener("keyup", (event) => this.#keys.up(event));
@@ -82,6 +90,7 @@ export class Keyboard {
     this.drop();
     attribute(this.button, "aria-pressed", String(on));
     text(this.button, on ? "Keyboard is on" : "Keyboard is off");
+    text(this.hint, on ? HINTS.on : HINTS.off);
   }
 
   #onKey(event) {

@@ -128,6 +128,8 @@ export class Sliders {
     speed.addEventListener("pointerdown", hold);
     speed.addEventListener("keydown", (event) => this.#byKey(event, hold));
     for (const end of ["pointerup", "pointercancel", "keyup", "blur"]) speed.addEventListener(end, letGo);
+    // arrow keys drive by a slider that somebody has chosen with Tab alone: one that a pointer has held gives up the focus
+    for (const end of ["pointerup", "click"]) speed.addEventListener(end, () => speed.blur());
     // a value that comes without a hold (a wheel, an aid) does not stay
     speed.addEventListener("change", () => this.#held || this.drop());
     speed.addEventListener("input", () => this.#held || this.drop());

@@ -1,7 +1,7 @@
-/** A stick on the screen: held by a finger, a mouse or the arrow keys; it springs back when it is let go of. */
+/** A stick on the screen: held by a finger, a mouse, or the arrow keys once Tab has led to it; it springs back. */
 
 import { h, attribute } from "./dom.js";
-import { HeldKeys } from "./keyboard.js";
+import { ARROWS, HeldKeys } from "./keyboard.js";
 
 /** Share of the way around the middle that is nothing. */
 const DEAD_ZONE = 0.06;
@@ -24,12 +24,13 @@ export class Stick {
     this.left = this.forward = 0;
     /** Whether it goes aside; else it only goes forward and backward. */
     this.twoWays = true;
-    this.#keys = new HeldKeys((left, forward, held) => this.#byKeys(left, forward, held));
+    this.#keys = new HeldKeys(ARROWS, (left, forward, held) => this.#byKeys(left, forward, held));
     this.element = this.#pad = h(
       "div",
       { class: "stick", tabindex: "0", role: "application", "aria-label": "Stick: hold the arrow keys to drive" },
       h("span", { class: "up", "aria-hidden": "true" }, "forward"),
       h("span", { class: "down", "aria-hidden": "true" }, "backward"),
+      h("span", { class: "keys", "aria-hidden": "true" }, "the arrow keys drive"),
       this.#knob,
     );
     this.#listen();
@@ -58,6 +59,7 @@ export class Stick {
     this.#pad.addEventListener("keydown", (event) => this.#allowed && this.#keys.down(event));
     this.#pad.addEventListener("keyup", (event) => this.#keys.up(event));
     this.#pad.addEventListener("blur", () => this.#keys.drop());
+    this.#pad.addEventListener("mousedown", leaveTheFocus);
     this.#pad.addEventListener("contextmenu", (event) => event.preventDefault());
   }
 
@@ -100,6 +102,12 @@ export class Stick {
     const reach = (this.#pad.clientWidth - this.#knob.offsetWidth) / 2;
     this.#knob.style.transform = `translate(${-this.left * reach}px, ${-this.forward * reach}px)`;
   }
+}
+
+/** A mouse gives no focus: arrow keys drive by the stick that somebody has chosen with Tab alone. */
+function leaveTheFocus(event) {
+  event.preventDefault();
+  document.activeElement?.blur();
 }
 
 function clipped(share) {
