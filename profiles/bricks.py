@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta
 
-from profiles.parts import Name, NotNegative, Part, Positive
+from profiles.parts import Length, Name, NotNegative, Part, Positive, WheelRadius
 
 
 class NxtMotorConfig(Part, frozen=True, kw_only=True):
@@ -14,7 +14,7 @@ class NxtMotorConfig(Part, frozen=True, kw_only=True):
 
     output: Literal["A", "B", "C"]
     """The brick's port."""
-    wheel_radius_m: Positive
+    wheel_radius_m: WheelRadius
     direction: Literal[1, -1] = 1
     """1: positive power rolls the wheel forward."""
     play_deg: NotNegative = 0.0
@@ -42,7 +42,7 @@ class DifferentialGeometry(Part, frozen=True, kw_only=True, tag_field="type", ta
     """A robot on two driven wheels on one axis (Siegwart and Nourbakhsh, Autonomous Mobile Robots, 3.2)."""
 
     type: ClassVar[str] = "differential"
-    half_track_m: Positive
+    half_track_m: Length
     """l: from the middle of the axis to each wheel."""
     wheels: tuple[str, str]
     """Names of the drives, or motors, of the wheels: right, left."""

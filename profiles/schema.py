@@ -18,7 +18,7 @@ from profiles.bricks import BrickConfig, DifferentialGeometry, NxtMotorConfig
 from profiles.gamepad import GamepadConfig
 from profiles.localisation import LocalisationConfig, SimulatedScannerConfig
 from profiles.own_vehicle import OwnGeometry
-from profiles.parts import Name, NotNegative, Part, Positive
+from profiles.parts import Length, Name, NotNegative, Offset, Part, Positive, WheelRadius
 from profiles.plausibility import PlausibilityConfig
 from profiles.sensors import AngleCalibration, SensorDefects
 from profiles.steered import CarGeometry, SemitrailerGeometry
@@ -116,7 +116,7 @@ class DriveConfig(Part, frozen=True, kw_only=True):
     gear_efficiency: Efficiency = 1.0
     belt_ratio: Positive = 1.0
     """Turns of the gear's output per turn of the wheel."""
-    wheel_radius_m: Positive
+    wheel_radius_m: WheelRadius
     direction: Literal[1, -1] = 1
     """1: positive motor speed rolls the wheel forward; -1: the motor is mounted mirrored."""
     mode: Literal["profile_velocity", "velocity", "expiring_position"] = "profile_velocity"
@@ -212,13 +212,13 @@ class PairedSteerGeometry(Part, frozen=True, kw_only=True, tag_field="type", tag
 
     type: ClassVar[str] = "paired_steer"
     mass_kg: Positive
-    wheelbase_m: Positive
+    wheelbase_m: Length
     """l: distance between the steering axes of the rear and the front pair."""
-    pivot_track_m: Positive
+    pivot_track_m: Length
     """h: distance between the steering axes of the right and the left side."""
-    contact_offset_m: NotNegative
+    contact_offset_m: Annotated[float, Meta(ge=0, le=5)]
     """a: from a steering axis outward along the axle to the wheel's contact point."""
-    contact_lead_m: float
+    contact_lead_m: Offset
     """b: from a steering axis outward along the heading (front pair forward, rear pair backward)."""
     max_heading_deg: Annotated[float, Meta(gt=0, lt=90)]
     """Steering stops: a pair turns at most this far to each side."""
@@ -237,7 +237,7 @@ class OmniWheelGeometry(Part, frozen=True, kw_only=True):
 
     direction_deg: float
     """Direction of rolling in the robot's frame, counter-clockwise positive."""
-    lever_m: float
+    lever_m: Annotated[float, Meta(ge=-20, le=20)]
     """Distance of the rolling line from the centre; positive where it rolls counter-clockwise about the centre."""
 
 

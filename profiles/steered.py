@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
-from profiles.parts import NotNegative, Part, Positive
+from profiles.parts import Length, NotNegative, Offset, Part, Positive
 
 
 class SteeredAxle(Part, frozen=True, kw_only=True):
@@ -39,9 +39,9 @@ class CarGeometry(Part, frozen=True, kw_only=True, tag_field="type", tag="ackerm
     mass_kg: Positive
     yaw_inertia_kg_m2: Positive
     centre_of_mass_height_m: NotNegative = 0.0
-    wheelbase_m: Positive
+    wheelbase_m: Length
     """L: distance between the axles."""
-    track_m: Positive
+    track_m: Length
     """W: distance between the wheels of an axle."""
     mass_offset_m: NotNegative
     """a: of the centre of mass forward of the rear axle."""
@@ -61,7 +61,7 @@ class TrailerGeometry(Part, frozen=True, kw_only=True):
     mass_kg: Positive
     yaw_inertia_kg_m2: Positive
     """About its centre of mass."""
-    length_m: Positive
+    length_m: Length
     """L2: from the hitch back to the axle."""
     mass_offset_m: NotNegative
     """Of the centre of mass behind the hitch."""
@@ -79,11 +79,11 @@ class SemitrailerGeometry(Part, frozen=True, kw_only=True, tag_field="type", tag
     """Of the truck."""
     yaw_inertia_kg_m2: Positive
     """Of the truck, about its centre of mass."""
-    wheelbase_m: Positive
+    wheelbase_m: Length
     """L1: from the steered to the driven axle."""
     mass_offset_m: NotNegative
     """Of the truck's centre of mass forward of the driven axle."""
-    hitch_offset_m: float
+    hitch_offset_m: Offset
     """M1: of the hitch behind the driven axle; negative: ahead of it."""
     wheels: tuple[str]
     """Name of the drive of the driven axle."""

@@ -35,6 +35,13 @@ from vcan_tests.profiles.conftest import Mistakes, Robot
             "vehicle: {max_heading_deg: 90}",
             "vehicle.max_heading_deg: is 90; write a number greater than 0 and below 90",
         ),
+        (
+            "drives: {rear_left: {wheel_radius_m: 100}}",
+            "drives.rear_left.wheel_radius_m: is 100; write a number from 0.001 to 1",
+        ),
+        ("vehicle: {wheelbase_m: 450}", "vehicle.wheelbase_m: is 450; write a number greater than 0 and to 20"),
+        ("vehicle: {contact_offset_m: 75}", "vehicle.contact_offset_m: is 75; write a number from 0 to 5"),
+        ("vehicle: {contact_lead_m: -10}", "vehicle.contact_lead_m: is -10; write a number from -5 to 5"),
         ("network: {bit_rate: 123456}", "network.bit_rate: is 123456; write one of 20000, 50000, 125000, "),
         ("encoders: {rear: {total_counts: few}}", "encoders.rear.total_counts: is 'few'; write a whole number from 1 "),
         ("description: 5", "description: is 5; write a text"),
@@ -48,6 +55,10 @@ from vcan_tests.profiles.conftest import Mistakes, Robot
 )
 def test_a_value_of_the_wrong_shape_is_a_mistake_on_its_line(mistakes: Mistakes, yaml: str, mistake: str) -> None:
     assert [found for found in mistakes(yaml) if found.startswith(f"lab.yaml:4: {mistake}")]
+
+
+def test_a_length_in_millimetres_is_the_only_mistake_that_is_told(mistakes: Mistakes) -> None:
+    assert len(mistakes("drives: {rear_left: {wheel_radius_m: 100}}")) == 1
 
 
 def test_an_optional_value_may_be_empty(robot: Robot) -> None:
