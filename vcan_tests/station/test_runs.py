@@ -74,3 +74,19 @@ def test_a_run_of_a_motion_that_goes_on_is_under_way(reader: Operator, robot: Ro
     robot.comes_to(lambda status: not status["runs"]["under_way"])
     reader.page.locator(RUNS).get_by_role("button", name="Reload").click()
     sees_run(reader, number, "stopped")
+
+
+def test_runs_that_cannot_be_written_are_told_with_what_mends_it(reader: Operator, fleet: Fleet) -> None:
+    robot = Robot(fleet.folder, "max2d", ("--runs", "/proc/runs"))
+    try:
+        robot.call("drive.parallel", angle_deg=0.0, speed_m_s=0.1, duration_s=0.2)
+        robot.comes_to(lambda status: status["runs"]["message"])
+        reader.choose("max2d")
+        reader.go_to("runs")
+        reader.sees(RUNS, "runs cannot be written to /proc/runs.*canhelm run --runs DIR")
+        reader.catches_up()
+        assert "No runs yet" not in reader.text(RUNS)
+        reader.choose("semitrailer")
+        reader.until(lambda: "cannot be written" not in reader.text(RUNS), lambda: "told of the other robot, too")
+    finally:
+        robot.end()

@@ -28,6 +28,7 @@ class RunsPanel {
   #chosen = null;
   #asked = 0;
   #wanted = false;
+  #count = null;
 
   constructor(station) {
     this.station = station;
@@ -49,6 +50,7 @@ class RunsPanel {
     attribute(element, "role", "table");
     attribute(body, "role", "rowgroup");
     this.told = h("p", { class: "reason", role: "status" });
+    this.trouble = h("p", { class: "reason", role: "status" });
     this.title = h("h3");
     this.picture = h("img", { class: "run-picture", hidden: true, alt: "" });
     this.picture.addEventListener("load", () => this.#drawn());
@@ -59,7 +61,7 @@ class RunsPanel {
     const row = h("div", { class: "row" }, this.button, this.why);
     this.opened = h("section", { "aria-label": "Opened run", hidden: true }, this.title, this.drawing, this.picture);
     this.list = h("div", { class: "scroll", hidden: true }, element);
-    const parts = [title, row, this.told, this.opened, this.list];
+    const parts = [title, row, this.trouble, this.told, this.opened, this.list];
     this.element = h("section", { class: "runs", "aria-labelledby": "runs-title" }, ...parts);
   }
 
@@ -71,19 +73,23 @@ class RunsPanel {
     const reason = this.station.cannot("station.runs");
     allow(this.button, reason);
     text(this.why, reason ? `Not now: ${reason}` : "");
+    const { message = "", remedy = "" } = this.station.status?.runs ?? {};
+    text(this.trouble, [message, remedy].filter(Boolean).join(" – "));
+    text(this.told, counted(this.#count, message));
   }
 
   #forget() {
     this.#asked += 1;
+    this.#count = null;
     this.#showList([]);
     this.#close();
-    text(this.told, "");
   }
 
   /** An empty table is left out. */
   #showList(runs) {
     this.#rows.show(runs);
     this.list.hidden = !runs.length;
+    this.#show();
   }
 
   /** Read the list of runs anew; open the newest, if that is wanted. */
@@ -92,9 +98,8 @@ class RunsPanel {
     const answer = await this.station.attempt(this.station.call("station.runs", {}, { timeout_ms: 15_000 }), "Runs");
     if (!answer || asked !== this.#asked) return;
     const runs = answer.runs.toReversed();
+    this.#count = runs.length;
     this.#showList(runs);
-    const count = `${runs.length} ${runs.length === 1 ? "run" : "runs"}`;
-    text(this.told, runs.length ? count : "No runs yet: every motion leaves one.");
     if (this.#wanted && runs.length) this.#open(runs[0]);
     this.#wanted = false;
   }
@@ -166,4 +171,10 @@ function when({ begun, struck }) {
   const time = struck ?? begun;
   if (!time) return "–";
   return `${struck ? "fault struck" : "begun"} ${new Date(time).toLocaleString(undefined, CLOCK)}`;
+}
+
+/** How many runs there are; of none nothing is said before they have been read, and where they cannot be written. */
+function counted(count, trouble) {
+  if (!count) return count === null || trouble ? "" : "No runs yet: every motion leaves one.";
+  return `${count} ${count === 1 ? "run" : "runs"}`;
 }
