@@ -98,9 +98,9 @@ class PathFile:
 
 
 def find_path_file(name_or_path: str | Path) -> Path:
-    """The file of a path: a path as it is, a name among the shipped ones. Raises UsageError."""
+    """The file of a path: whatever can be read, as a pipe, or a name among the shipped ones. Raises UsageError."""
     text = str(name_or_path)
-    if os.path.isfile(text):
+    if os.path.exists(text) and not os.path.isdir(text):
         return Path(text)
     shipped = SHIPPED / f"{text}.yaml"
     if shipped.is_file() and "/" not in text:
@@ -180,9 +180,11 @@ def _mistake(file: Path, line: int, what: str, remedy: str) -> UsageError:
 def _read(file: Path) -> str:
     """Raises UsageError."""
     try:
-        if file.stat().st_size > MAX_FILE_BYTES:
+        with file.open("rb") as opened:  # a pipe tells no size before it has been read
+            content = opened.read(MAX_FILE_BYTES + 1)
+        if len(content) > MAX_FILE_BYTES:
             raise _mistake(file, 1, f"is larger than {MAX_FILE_BYTES / 1e6:g} MB", "drive it in parts")
-        return file.read_text("utf-8-sig")
+        return content.decode("utf-8-sig")
     except OSError as error:
         raise _mistake(file, 1, f"cannot be read ({error.strerror})", "check its permissions") from None
     except UnicodeDecodeError:

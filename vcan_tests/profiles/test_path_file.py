@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -125,6 +126,21 @@ def test_a_file_that_is_not_there_is_told_with_those_that_are_shipped() -> None:
 def test_a_directory_is_told_to_be_one(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="is a directory, not a path file"):
         load_path_file(tmp_path)
+
+
+def test_a_path_is_read_from_a_pipe() -> None:
+    reading, writing = os.pipe()
+    try:
+        with os.fdopen(writing, "w") as pipe:
+            pipe.write("pieces: [{line_m: 1.5}]")
+        assert load_path_file(f"/dev/fd/{reading}").spec.pieces == [PieceSpec(line_m=1.5)]
+    finally:
+        os.close(reading)
+
+
+def test_what_never_ends_is_refused_as_too_large() -> None:
+    with pytest.raises(UsageError, match="/dev/zero:1: is larger than 20 MB"):
+        load_path_file("/dev/zero")
 
 
 def test_an_empty_name_is_told_to_be_empty() -> None:
