@@ -236,7 +236,7 @@ class Connection(asyncio.Protocol):
     def _begin(self, request_id: int | str | None, name: str, params: dict[str, Any], answer: bool) -> None:
         try:
             method = self._admitted(name)
-            checked = validate(method, params)
+            checked = self._peer.signed(name, validate(method, params))
         except CanhelmError as error:
             if answer:
                 code = protocol.METHOD_NOT_FOUND if name not in METHODS else error.rpc_code

@@ -73,7 +73,7 @@ _WHOLE = (
     Method(
         "stop",
         "Stop everything now; answers at rest. Needs no lease.",
-        (Param("reason", "string", "how it was, and by whom, for people", default="commanded"),),
+        (Param("reason", "string", "how it was, for people; commanded, and by whom, where left out", default=None),),
         "state, enabled, message",
         Role.STOP,
         urgent=True,

@@ -99,6 +99,12 @@ class Peer:
         told = self.name or f"{self.user} (pid {self.pid}: {self._command})"
         return f"{self.label} by {told}" if self.label else told
 
+    def signed(self, method: str, params: dict[str, Any]) -> dict[str, Any]:
+        """The parameters of what it asks for; a stop without a reason gets one that says by whom it is."""
+        if method != "stop" or params["reason"]:
+            return params
+        return {**params, "reason": f"commanded by {self.told()}"}
+
     @property
     def _command(self) -> str:
         return command_of(self.pid)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import re
+
 import pytest
 
 from vcan_tests.daemon.api.raw_client import RawClient
@@ -40,6 +43,19 @@ async def test_a_stop_that_ends_a_motion_is_an_event_that_tells_how_it_came() ->
         await robot.call("stop", reason=f"pressed on {PAGE}")
         told = [event["message"] for event in robot.app.service.status()["events"]]
     assert told.count(f"stop was pressed on {PAGE}") == 1
+
+
+async def test_a_stop_without_a_reason_tells_by_whom_it_was_commanded(client: RawClient, backend: FakeBackend) -> None:
+    await client.ask("stop")
+    assert re.fullmatch(rf"commanded by \S+ \(pid {os.getpid()}: .+\)", backend.calls[-1][1]["reason"])
+    await client.ask("client.name", name=PAGE)
+    await client.ask("stop")
+    assert backend.calls[-1][1]["reason"].startswith(f"commanded by {PAGE} by ")
+
+
+async def test_a_stop_keeps_the_reason_that_it_came_with(client: RawClient, backend: FakeBackend) -> None:
+    await client.ask("stop", reason="pressed")
+    assert backend.calls[-1][1]["reason"] == "pressed"
 
 
 async def test_a_stop_of_a_robot_that_does_nothing_is_no_event() -> None:
