@@ -1,4 +1,4 @@
-"""On a phone: what is told lies over nothing that drives or stops, and each panel begins at its top."""
+"""On a phone: what is told lies over nothing that drives, stops or leads elsewhere; each panel begins at its top."""
 
 from __future__ import annotations
 
@@ -19,6 +19,11 @@ SAY = """async () => {
     const { station } = await import("/page/station.js");
     for (const n of [1, 2, 3]) station.say(`something went wrong, number ${n}: ${"why ".repeat(40)}`, "error", "wait");
 }"""
+SAY_LONG = """async () => {
+    const { station } = await import("/page/station.js");
+    station.say(`saved as /${"a-folder-with-a-long-name-".repeat(12)}/way.yaml`);
+}"""
+TABS = tuple(f"nav a[href='#{panel}']" for panel in ("drive", "map", "devices", "simulation"))
 COVERED = """selector => {
     const element = document.querySelector(selector);
     if (!element.closest("header")) element.scrollIntoView({ block: "center" });
@@ -37,14 +42,29 @@ def holder(request: pytest.FixtureRequest, meet: Meet, robot: Robot) -> Operator
     return operator
 
 
-def test_notices_cover_neither_stop_nor_what_drives_and_can_be_closed(holder: Operator) -> None:
+def test_notices_cover_neither_stop_nor_tabs_nor_what_drives_and_can_be_closed(holder: Operator) -> None:
     holder.page.evaluate(SAY)
     holder.sees("#alarms", "number 3")
-    for selector in ("#stop", "#estop", ".stick", "#slider-speed", "#slider-fastest"):
+    for selector in ("#stop", "#estop", ".stick", "#slider-speed", "#slider-fastest", *TABS):
         assert (selector, holder.page.evaluate(COVERED, selector)) == (selector, False)
     for left in (2, 1, 0):
+        holder.comes_to(lambda: holder.page.locator(".notice:visible").count(), 1)
+        holder.comes_to(lambda: holder.text("#more-notices"), f"and {left} more" if left else "")
         holder.page.tap("#notices .close >> nth=0")
         holder.comes_to(holder.page.locator(".notice").count, left)
+
+
+def test_a_notice_with_a_long_word_is_no_wider_than_the_phone_and_can_be_closed(holder: Operator) -> None:
+    holder.page.evaluate(SAY_LONG)
+    holder.sees("#notes", "way.yaml")
+    for selector in ("#stop", *TABS):
+        assert (selector, holder.page.evaluate(COVERED, selector)) == (selector, False)
+    assert holder.page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
+    box = holder.page.locator(".notice .close").bounding_box()
+    assert box is not None
+    assert box["x"] + box["width"] <= holder.page.evaluate("() => innerWidth")
+    holder.page.tap(".notice .close")
+    holder.comes_to(holder.page.locator(".notice").count, 0)
 
 
 def test_another_panel_begins_at_its_top(meet: Meet, robot: Robot) -> None:

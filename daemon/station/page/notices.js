@@ -1,6 +1,9 @@
-/** What is told to people in passing; errors stay longer, and what has a key until it is unsaid. */
+/**
+ * What is told to people in passing; errors stay longer, and what has a key until it is unsaid. A phone shows the first
+ * alone, which is what stays wherever there is such, and says how many more there are.
+ */
 
-import { h } from "./dom.js";
+import { h, text } from "./dom.js";
 import { inPageWords } from "./words.js";
 
 const SHOWN_MS = { info: 5000, warning: 12000, error: 20000 };
@@ -13,6 +16,15 @@ export function showNotices(station) {
   const alarms = document.getElementById("alarms");
   station.on("said", (said) => add(said.severity === "error" ? alarms : notes, said));
   station.on("unsaid", (key) => find(alarms, key)?.remove());
+  const counter = new MutationObserver(() => count(notes, alarms));
+  for (const list of [notes, alarms]) counter.observe(list, { childList: true });
+}
+
+function count(...lists) {
+  const more = lists.reduce((sum, list) => sum + list.childElementCount, -1);
+  const element = document.getElementById("more-notices");
+  element.hidden = more < 1;
+  text(element, more < 1 ? "" : `and ${more} more`);
 }
 
 function find(list, key) {
@@ -26,7 +38,7 @@ function add(list, { text, severity, remedy, key }) {
     remedy && h("span", {}, ` – ${inPageWords(remedy)}`));
   const notice = h("div", { class: `notice ${severity}`, "data-key": key ?? text }, words, close);
   close.addEventListener("click", () => notice.remove());
-  list.prepend(notice);
+  list.insertBefore(notice, key ? list.firstChild : list.querySelector("[data-passing]"));
   if (key) return;
   notice.dataset.passing = "";
   const passing = list.querySelectorAll("[data-passing]");
