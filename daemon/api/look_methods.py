@@ -11,8 +11,8 @@ LOOK_METHODS: Final = (
         "vehicle.shape",
         "What the vehicle looks like from above and what it may do; it does not change while the daemon runs.",
         (),
-        "type, parts (name, outline_m), wheels, limits, stream (parameters of drive.set that make sense), path "
-        "(smallest radii, lead_m), reflectors, simulated",
+        "type, parts (name, outline_m), wheels, steering (drive of a steered axle, or null), limits, stream "
+        "(parameters of drive.set that make sense), path (smallest radii, lead_m), reflectors, simulated",
         Role.WATCH,
     ),
 )

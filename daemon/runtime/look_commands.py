@@ -11,7 +11,8 @@ from daemon.runtime.path_commands import PathVehicle
 from daemon.runtime.shapes import shape_of
 from daemon.runtime.supervisor import Supervisor
 from daemon.runtime.vehicle_view import followed
-from profiles.steered import SemitrailerGeometry
+from profiles.schema import Geometry
+from profiles.steered import CarGeometry, SemitrailerGeometry
 
 MAX_SHOWN: Final = 2000
 """Pieces in one answer; a path may have more."""
@@ -39,6 +40,7 @@ class LookCommands:
         return {
             "type": profile.vehicle.type if profile.vehicle else None,
             **shape_of(profile).told(),
+            "steering": _steering_drive(profile.vehicle),
             "limits": self._limits(),
             "stream": self._stream(),
             "path": self._path(),
@@ -121,6 +123,11 @@ def _lead_m(geometry: object) -> float:
 
 def _end(stick: tuple[float, float] | None) -> float | None:
     return None if stick is None else round(stick[1], 6)
+
+
+def _steering_drive(geometry: Geometry | None) -> str | None:
+    """Name of the drive that turns a steered axle, and rolls no wheel; None where there is none."""
+    return geometry.steering.drive if isinstance(geometry, CarGeometry | SemitrailerGeometry) else None
 
 
 def _rounded_up(radius_m: float | None) -> float | None:

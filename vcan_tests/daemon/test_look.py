@@ -100,6 +100,12 @@ async def test_only_the_semitrailer_has_a_trailer_and_a_limit_of_bending() -> No
         assert max(x for x, _ in told["parts"][1]["outline_m"]) > 0.615
 
 
+@pytest.mark.parametrize(("name", "drive"), [("semitrailer", "steering"), ("ackermann", "steering"), ("max2d", None)])
+async def test_the_drive_of_a_steered_axle_is_named(name: str, drive: str | None) -> None:
+    async with running_robot(load(name).profile) as robot:
+        assert (await shape(robot))["steering"] == drive
+
+
 async def test_a_car_without_reverse_says_so() -> None:
     async with running_robot(load("ackermann").profile) as robot:
         told = await shape(robot)

@@ -1,7 +1,8 @@
-"""The speed of time of a simulated robot, and the time of day beside it."""
+"""The speed of time of a simulated robot, the time of day beside it, and which of its drives roll on a floor."""
 
 from __future__ import annotations
 
+import re
 import time
 
 import pytest
@@ -11,6 +12,7 @@ from vcan_tests.station.processes import Robot
 
 pytestmark = pytest.mark.station
 
+ROBOTS = ("max2d", "semitrailer")
 LOOK_S = 1.0
 AHEAD_S = 8.0
 """By the robot's clock while its time passes four times as fast."""
@@ -38,3 +40,10 @@ def test_events_are_dated_by_the_time_of_day_however_time_has_passed(operator: O
     told = [event["unix_s"] for event in reversed(robot.status()["events"])]
     shown = operator.page.locator("ol.events time")
     operator.comes_to(lambda: shown.evaluate_all(DATES), pytest.approx(told, abs=0.002))
+
+
+def test_the_drive_of_a_steered_axle_is_not_put_on_ice(operator: Operator) -> None:
+    operator.choose("semitrailer")
+    operator.go_to("simulation")
+    ice = operator.page.get_by_role("button", name=re.compile("^Put .* on ice$"))
+    operator.comes_to(ice.all_inner_texts, ["Put drive on ice"])

@@ -152,9 +152,9 @@ export class Ice {
   }
 }
 
-/** Drives that have a wheel in the vehicle's shape; all of them where the shape names its wheels otherwise. */
+/** Drives that have a wheel in the vehicle's shape; where the shape names its wheels otherwise, all but the steering's. */
 function wheelsOf(shape, drives) {
   const wheels = new Set(shape?.wheels?.map(({ name }) => name));
   const found = drives.filter((name) => wheels.has(name));
-  return found.length ? found : drives;
+  return found.length ? found : drives.filter((name) => name !== shape?.steering);
 }
