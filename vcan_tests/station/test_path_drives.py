@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from vcan_tests.station.browser import Operator
+from vcan_tests.station.processes import Robot, speeds
 from vcan_tests.station.test_paths import PANEL, insert
 
 pytestmark = pytest.mark.station
@@ -48,6 +49,23 @@ def drawer(operator: Operator) -> Operator:
 def map_in_words(operator: Operator) -> str:
     """What the map tells who does not see it."""
     return operator.page.locator(MAP).get_attribute("aria-label") or ""
+
+
+def test_pieces_stand_under_their_heading(drawer: Operator) -> None:
+    def top(selector: str) -> float:
+        box = drawer.page.locator(f"{PANEL} {selector}").bounding_box()
+        assert box is not None
+        return float(box["y"])
+
+    parts = ("legend:text-is('Start')", "#path-here", "legend:text-is('Pieces')", ".path-pieces")
+    assert sorted(parts, key=top) == list(parts)
+
+
+def test_what_is_told_of_a_path_that_was_stopped_is_a_sentence(drawer: Operator, robot: Robot) -> None:
+    drawer.page.click("#path-drive")
+    robot.comes_to(lambda status: max(speeds(status)) > 0.05)
+    drawer.page.keyboard.press("Space")
+    drawer.sees(PANEL, r"not driven to its end: .*[^.]\. The path in the editor")
 
 
 def test_a_path_that_begins_where_the_vehicle_is_says_that_it_begins_anew(drawer: Operator) -> None:

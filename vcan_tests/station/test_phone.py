@@ -9,6 +9,7 @@ import pytest
 from vcan_tests.station.browser import PHONE, Operator
 from vcan_tests.station.conftest import Meet
 from vcan_tests.station.processes import Robot
+from vcan_tests.station.test_paths import PIECES, insert
 from vcan_tests.station.test_views import NARROW
 
 pytestmark = pytest.mark.station
@@ -23,6 +24,8 @@ SAY_LONG = """async () => {
     const { station } = await import("/page/station.js");
     station.say(`saved as /${"a-folder-with-a-long-name-".repeat(12)}/way.yaml`);
 }"""
+LEAST_WIDTH = 44
+"""Of what a thumb meets, in pixels of the page."""
 TABS = tuple(f"nav a[href='#{panel}']" for panel in ("drive", "map", "devices", "simulation"))
 COVERED = """selector => {
     const element = document.querySelector(selector);
@@ -65,6 +68,22 @@ def test_a_notice_with_a_long_word_is_no_wider_than_the_phone_and_can_be_closed(
     assert box["x"] + box["width"] <= holder.page.evaluate("() => innerWidth")
     holder.page.tap(".notice .close")
     holder.comes_to(holder.page.locator(".notice").count, 0)
+
+
+@pytest.mark.parametrize("size", [PHONE, NARROW])
+def test_all_boxes_of_a_path_are_in_sight(meet: Meet, robot: Robot, size: dict[str, Any]) -> None:
+    operator = meet(**size)
+    operator.open(robot.name)
+    operator.go_to("paths")
+    insert(operator, "line", length="1")
+    insert(operator, "arc", radius="2", turn="30")
+    controls = operator.page.locator(f"{PIECES} :is(input, select, button)")
+    assert controls.count() == 12
+    for box in [control.bounding_box() for control in controls.all()]:
+        assert box is not None
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= size["viewport"]["width"]
+        assert box["width"] >= LEAST_WIDTH
 
 
 def test_another_panel_begins_at_its_top(meet: Meet, robot: Robot) -> None:

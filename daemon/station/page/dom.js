@@ -37,6 +37,11 @@ export function number(value, digits = 2) {
   return (Number(told) === 0 ? told.replace("-", "") : told).replace("-", "−");
 }
 
+/** A number with its unit; a degree sign stands beside the number. */
+export function quantity(value, digits, unit) {
+  return `${number(value, digits)}${unit.startsWith("°") ? "" : " "}${unit}`;
+}
+
 /**
  * Draw at most once an animation frame, and not while the element cannot be seen.
  *

@@ -1,6 +1,6 @@
 /** The panel for driving by hand: by stick, sliders, keys or gamepad, each only while it is held. */
 
-import { allow, h, number, redraw, text } from "./dom.js";
+import { allow, h, number, quantity, redraw, text } from "./dom.js";
 import { GamepadDriver } from "./gamepad.js";
 import { Keyboard } from "./keyboard.js";
 import { TakenAtRest, asideOf, parametersOf, rangesOf, shareOf } from "./mapping.js";
@@ -29,6 +29,7 @@ class DrivePanel {
   #why = h("p", { class: "reason", id: "why-drive", role: "status" });
   #asideHint = h("p", { class: "reason" });
   #sent = h("output", { id: "commanded" });
+  #guarded = h("p", { class: "warn", id: "guarded", role: "status" });
 
   constructor(station) {
     this.#station = station;
@@ -70,7 +71,7 @@ class DrivePanel {
 
   #build() {
     const commanded = h("p", { class: "commanded" }, "Commanded: ", this.#sent);
-    const byStick = h("div", {}, this.#stick.element, this.#asideHint, commanded);
+    const byStick = h("div", {}, this.#stick.element, this.#asideHint, commanded, this.#guarded);
     const byKeys = h("div", { class: "row" }, this.#keyboard.button, this.#keyboard.hint);
     this.#hands = h("div", { class: "stack" }, h("div", { class: "hands" }, byStick, this.#sliders.element), byKeys);
     this.#byGamepad = h("div", { class: "stack" }, h("h3", {}, "Gamepad"), this.#gamepad.element);
@@ -136,10 +137,14 @@ class DrivePanel {
     this.#stick.allow(reason);
     this.#sliders.allow(reason);
     allow(this.#keyboard.button, reason);
+    this.#guarded.hidden = this.#station.status?.vehicle?.jackknife_margin_deg === undefined;
+    text(this.#guarded, wordsOfGuard(this.#station.status));
     this.#motions.show();
   }
 }
 
+/** Commanded speed that is told as standing. */
+const STANDS_M_S = 0.005;
 const UNITS = {
   speed_m_s: ["speed", 2, "m/s"],
   direction_deg: ["direction", 0, "°"],
@@ -150,7 +155,16 @@ const UNITS = {
 function wordsOf(parameters) {
   if (!parameters) return "nothing";
   const told = Object.entries(UNITS).filter(([name]) => parameters[name] !== undefined);
-  return told.map(([name, [word, digits, unit]]) => `${word} ${number(parameters[name], digits)} ${unit}`).join(", ");
+  return told.map(([name, [word, digits, unit]]) => `${word} ${quantity(parameters[name], digits, unit)}`).join(", ");
+}
+
+/** What the guard against jackknifing does to a motion; "" where it does nothing. */
+function wordsOfGuard(status) {
+  const held = status?.motions.find((motion) => motion.limits_active?.includes("jackknife"));
+  if (!held) return "";
+  const bent = `the trailer is bent by ${number(Math.abs(status.vehicle.bending_deg), 1)}°`;
+  if (Math.abs(held.speed_m_s) > STANDS_M_S) return `Slowed: ${bent}, which is near its largest angle.`;
+  return `Stands at its largest bending angle: ${bent}. Drive the other way.`;
 }
 
 /** The panel, as main.js shows it. */

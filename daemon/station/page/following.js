@@ -89,7 +89,7 @@ export class Following {
   #tellEnd({ message, remedy = "", data }) {
     const told = `The path was not driven to its end: ${message}`;
     this.station.say(told, data?.type === "Refused" ? "warning" : "error", remedy);
-    return told;
+    return told.endsWith(".") ? told : `${told}.`;
   }
 
   async #stop() {

@@ -5,6 +5,8 @@ import { choice, field, put } from "./fields.js";
 import { Rows, table } from "./rows.js";
 
 const HEADS = ["No.", "Shape", "Length [m]", "Radius [m]", "Turn left [°]", "Drive", "Remove"];
+/** What stands above a box where a phone shows a piece as a card. */
+const SHORT = { length_m: "Length [m]", radius_m: "Radius [m]", arc_deg: "Turn left [°]" };
 const LENGTH = { min: 0.01, max: 10000, required: true };
 const TURN = { min: -3600, max: 3600, required: true };
 const NO_TURN = "an arc turns: give degrees, or choose a line";
@@ -36,6 +38,8 @@ export class PathTable {
   constructor(editor) {
     this.editor = editor;
     const { table: element, body } = table("Pieces of the path", HEADS);
+    attribute(element, "role", "table");
+    attribute(body, "role", "rowgroup");
     this.element = h("div", { class: "scroll path-pieces" }, element);
     this.#rows = new Rows(body, ({ entry }) => this.#make(entry.id), ({ entry }) => entry.id);
   }
@@ -57,9 +61,10 @@ export class PathTable {
       drive: choice("", DRIVES, (drive) => change({ backward: drive === "backward" })),
       remove: h("button", { type: "button", onclick: () => this.#remove(index()) }, "✕"),
     };
-    const head = h("th", { scope: "row" });
-    const columns = Object.values(cells).map((cell) => h("td", {}, cell));
-    const element = h("tr", { onfocusin: () => this.editor.set("chosen", index()) }, head, ...columns);
+    const head = h("th", { scope: "row", role: "rowheader" });
+    const told = (name) => ({ role: "cell", "data-cell": name, "data-head": SHORT[name] });
+    const columns = Object.entries(cells).map(([name, cell]) => h("td", told(name), cell));
+    const element = h("tr", { role: "row", onfocusin: () => this.editor.set("chosen", index()) }, head, ...columns);
     return { element, show: ({ index: number, entry }) => this.#show(element, head, cells, number, entry) };
   }
 

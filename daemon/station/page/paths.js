@@ -47,7 +47,7 @@ class PathsPanel {
   #make() {
     this.lacking = h("p", { class: "reason", hidden: true }, "This vehicle follows no paths.");
     const { verdict, following, files, speeds } = this;
-    const parts = [verdict.element, following.element, this.#errorsPart(), this.#editorPart(), files.element];
+    const parts = [verdict.element, following.element, this.#errorsPart(), ...this.#editorPart(), files.element];
     this.body = h("div", { class: "path-body" }, ...parts);
     const unfold = { ontoggle: () => speeds.chart.changed() };
     const fold = h("details", unfold, h("summary", {}, "Speed of a drive"), speeds.element);
@@ -70,16 +70,16 @@ class PathsPanel {
     this.snap = h("input", { type: "checkbox", onchange: () => editor.set("snaps", this.snap.checked) });
     const line = button("Insert a line", () => editor.insert("line"));
     const arc = button("Insert an arc", () => editor.insert("arc"));
-    return h(
+    const pieces = h(
       "fieldset",
       {},
       h("legend", {}, "Pieces"),
-      this.start.element,
       this.table.element,
       h("div", { class: "row" }, line, arc, this.undo, this.redo, this.clear),
       h("label", { class: "tick" }, this.snap, `Snap to ${SNAP_M} m and ${SNAP_DEG}°`),
       h("p", { class: "muted" }, HINT),
     );
+    return [this.start.element, pieces];
   }
 
   /** Begin a new path; what was asked about the one before it is withdrawn. */

@@ -1,9 +1,10 @@
 /** Sliders for driving: speed only while it is held, everything else stays where it is put. */
 
-import { allow, h, number, text } from "./dom.js";
+import { allow, h, quantity, text } from "./dom.js";
 
 const LABELS = { speed: "Speed", direction: "Direction", yaw_rate: "Yaw rate", steering: "Steering" };
-const DIGITS = { "m/s": 2, deg: 0, "deg/s": 0 };
+/** Digits and unit for people, by the unit of the range. */
+const SHOWN = { "m/s": [2, "m/s"], deg: [1, "°"], "deg/s": [1, "°/s"] };
 const STEPS = { "m/s": 0.005, deg: 0.5, "deg/s": 0.5 };
 /** Share of the vehicle's own limit that a person begins with. */
 const FIRST_SHARE = 0.5;
@@ -43,7 +44,7 @@ class Slider {
 
   show() {
     const { unit } = this.#range ?? {};
-    const told = unit ? `${number(this.value, DIGITS[unit])} ${unit}` : "–";
+    const told = unit ? quantity(this.value, ...SHOWN[unit]) : "–";
     text(this.shown, told);
     this.input.setAttribute("aria-valuetext", told);
   }
@@ -56,6 +57,7 @@ class Slider {
 export class Sliders {
   #sliders = Object.fromEntries(Object.keys(LABELS).map((name) => [name, new Slider(name, LABELS[name])]));
   #fastest = new Slider("fastest", "Top speed");
+  #slowerBack = h("span", { class: "reason" });
   #ranges = {};
   #held = false;
   #onHold;
@@ -70,6 +72,7 @@ export class Sliders {
     const middle = h("button", { type: "button", onclick: () => this.#toMiddle() }, "All to the middle");
     const elements = [this.#fastest, speed, ...Object.values(others)].map((slider) => slider.element);
     this.element = h("div", { class: "sliders" }, elements, h("div", { class: "row" }, middle, hint));
+    this.#fastest.element.append(this.#slowerBack);
     this.#listen(speed.input);
   }
 
@@ -79,6 +82,8 @@ export class Sliders {
     for (const [name, slider] of Object.entries(this.#sliders)) slider.use(ranges[name] ?? null);
     const { speed } = ranges;
     this.#fastest.use(speed ? { ...speed, least: 0 } : null, FIRST_SHARE * (speed?.full ?? 0));
+    const slower = speed && -speed.least < speed.full;
+    text(this.#slowerBack, slower ? `backwards ${quantity(-speed.least, ...SHOWN[speed.unit])} at most` : "");
   }
 
   /** What the sliders command, by command; those that the vehicle has not are left out. */
@@ -92,11 +97,16 @@ export class Sliders {
     return this.#fastest.value;
   }
 
-  /** Commands of a stick, whose way ends at a person's own highest speed. */
+  /** Commands of a stick, whose way ends at a person's own highest speed, or at the vehicle's where that is less. */
   slowed(commands) {
-    const share = this.#ranges.speed ? this.fastest / this.#ranges.speed.full : 0;
-    const speeds = ["speed", "sideways"].filter((name) => name in commands);
-    return { ...commands, ...Object.fromEntries(speeds.map((name) => [name, commands[name] * share])) };
+    const speeds = ["speed", "sideways"].filter((name) => name in commands && this.#ranges[name]);
+    return { ...commands, ...Object.fromEntries(speeds.map((name) => [name, this.#slowed(name, commands[name])])) };
+  }
+
+  #slowed(name, value) {
+    const { least, full } = this.#ranges[name];
+    const end = Math.abs(value < 0 ? least : full);
+    return end && value * Math.min(1, this.fastest / end);
   }
 
   /** Why they cannot be used; null where they can. */
