@@ -96,7 +96,7 @@ def test_a_motor_that_is_jogged_by_a_key_stops_when_the_focus_goes_elsewhere(ope
 
 def test_a_jog_that_is_too_fast_is_refused_in_words(operator: Operator, robot: Robot) -> None:
     sees_devices(operator)
-    operator.page.fill(f"{CARD} input[inputmode=decimal]", "90000")
+    operator.page.fill(f"{CARD} input.number", "90000")
     operator.page.hover(FORWARD)
     operator.page.mouse.down()
     operator.sees("#alarms", "beyond the limit of front_left.*ask for less")

@@ -86,6 +86,16 @@ def test_all_boxes_of_a_path_are_in_sight(meet: Meet, robot: Robot, size: dict[s
         assert box["width"] >= LEAST_WIDTH
 
 
+def test_only_boxes_without_negative_numbers_call_for_keys_without_a_minus(meet: Meet, robot: Robot) -> None:
+    operator = meet(**PHONE)
+    operator.open(robot.name)
+    operator.go_to("paths")
+    insert(operator, "arc", radius="2", turn="30")
+    boxes = operator.page.locator(f"{PIECES} input.number")
+    keys = {str(box.get_attribute("aria-label")).split()[0]: box.get_attribute("inputmode") for box in boxes.all()}
+    assert keys == {"Length": "decimal", "Radius": "decimal", "Turn": "text"}
+
+
 def test_another_panel_begins_at_its_top(meet: Meet, robot: Robot) -> None:
     operator = meet(**PHONE)
     operator.open(robot.name)

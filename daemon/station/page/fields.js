@@ -17,7 +17,9 @@ let made = 0;
  * @param against why a number within the limits is no good one; "" where it is.
  */
 export function field(label, { min, max, whole, ...attributes }, change, against = () => "") {
-  const written = { type: "text", inputmode: "decimal", autocomplete: "off", spellcheck: "false" };
+  // the decimal keys of some phones have no minus
+  const keys = min >= 0 ? "decimal" : "text";
+  const written = { type: "text", class: "number", inputmode: keys, autocomplete: "off", spellcheck: "false" };
   const input = h("input", { ...written, "aria-label": label, ...attributes });
   made += 1;
   const note = h("span", { class: "wrong", id: `wrong-${made}` });

@@ -7,7 +7,7 @@ const CLICK_MS = 1000;
 const LOOK = "look at the robot; stop it there if it moves";
 /** Inputs in which a space is something to write. */
 const WRITING_TYPES = "[type=text], [type=search], [type=password], [type=url], :not([type])";
-const WRITING = `textarea, [contenteditable], input:is(${WRITING_TYPES}):not([inputmode=decimal])`;
+const WRITING = `textarea, [contenteditable], input:is(${WRITING_TYPES}):not(.number)`;
 const TICKED = "input:is([type=checkbox], [type=radio])";
 
 export class Stopper {
