@@ -55,6 +55,8 @@ BATCH = 256
 LOOK_S = 1.0
 FIRST_REOPEN_S = 0.1
 LAST_REOPEN_S = 1.0
+FRESH_S = 0.001
+"""A frame older than this has waited, and so may others that came with it."""
 OLDEST_STAMP_S = 60.0
 """A frame that seems older than this was stamped before the wall clock was set."""
 
@@ -119,7 +121,7 @@ class SocketCanBus(Bus):
         self._heard: dict[int, FrameHandler] = {}
         self._timer: asyncio.TimerHandle | None = None
         self._reopen_s = FIRST_REOPEN_S
-        self._now_s = self._wall_to_loop_s = 0.0
+        self._now_s = self._newest_s = self._wall_to_loop_s = 0.0
 
     async def open(self) -> None:
         """Open the interface on the running loop. Raises BusOff where it is down, missing, or has another bit rate."""
@@ -179,15 +181,19 @@ class SocketCanBus(Bus):
         """Take what has come, until nothing is left or a handler has closed the bus.
 
         Who asks for one more when nothing is left pays for a refusal, so as many are taken as there were the last time;
-        what is left then is called for anew.
+        what is left then is called for anew. What waited because this process stood still is taken wholly: the timers
+        that ran out meanwhile come next, and are not to take a node for silent whose frame is here.
         """
         link = self._link
         if link is None:
             return
         self._now_s = now_s = self._loop.time()
         self._wall_to_loop_s = now_s - time.time()
-        receive, take = link.recvmsg, self._take
-        for taken in range(self._burst):
+        receive, take, burst = link.recvmsg, self._take, self._burst
+        for taken in range(BATCH):
+            if taken >= burst and now_s - self._newest_s < FRESH_S:
+                self._burst = 2 * taken
+                return
             try:
                 packet, ancillary, flags, _ = receive(LONGEST_PACKET_BYTES, ANCILLARY_BYTES)
             except BlockingIOError:
@@ -199,7 +205,6 @@ class SocketCanBus(Bus):
             take(packet, ancillary, flags)
             if link is not self._link:
                 return
-        self._burst = min(2 * self._burst, BATCH)
 
     def _take(self, packet: bytes, ancillary: Ancillary, flags: int) -> None:
         frame = parse_frame(packet)
@@ -232,10 +237,9 @@ class SocketCanBus(Bus):
         wall_s, lost = parse_ancillary(ancillary)
         if lost:
             self._count_overflow(lost)
-        if wall_s is None:
-            return self._now_s
-        stamp = wall_s + self._wall_to_loop_s
-        return stamp if abs(stamp - self._now_s) < OLDEST_STAMP_S else self._now_s
+        stamp = self._now_s if wall_s is None else wall_s + self._wall_to_loop_s
+        self._newest_s = stamp if abs(stamp - self._now_s) < OLDEST_STAMP_S else self._now_s
+        return self._newest_s
 
     def _count_overflow(self, lost: int) -> None:
         """Count what the receive buffer had no room for; the kernel counts in 32 bits since the socket was made."""

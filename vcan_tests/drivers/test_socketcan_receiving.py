@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import struct
+import time
 from collections.abc import AsyncIterator
 from typing import Any
 
 import pytest
 
 from drivers.bus.socketcan import SocketCanBus
-from drivers.bus.socketcan_frames import make_frame
+from drivers.bus.socketcan_frames import SO_TIMESTAMPNS, make_frame
 
 pytestmark = pytest.mark.real_time
 
@@ -19,11 +21,17 @@ SLEEPS = 10
 
 
 class CountingEnd(socket.socket):
-    """One end of a socket pair, which counts how often it is asked for a frame, and takes no option of CAN's."""
+    """One end of a socket pair, which counts how often it is asked for a frame, and takes no option of CAN's.
+
+    Attributes:
+        asked: how often.
+        age_s: how long its frames have waited, by the time stamps that it adds.
+    """
 
     def __init__(self, end: socket.socket) -> None:
         super().__init__(end.family, end.type, fileno=end.detach())
         self.asked = 0
+        self.age_s = 0.0
 
     def bind(self, address: Any) -> None:
         """Nothing: it is bound to the other end."""
@@ -34,9 +42,12 @@ class CountingEnd(socket.socket):
             super().setsockopt(level, option, value)
 
     def recvmsg(self, *arguments: int) -> Any:
-        """As ever."""
+        """As ever, with a time stamp."""
         self.asked += 1
-        return super().recvmsg(*arguments)
+        packet, _, flags, address = super().recvmsg(*arguments)
+        seconds, rest_s = divmod(time.time() - self.age_s, 1.0)
+        stamp = struct.pack("@ll", int(seconds), int(rest_s * 1e9))
+        return packet, [(socket.SOL_SOCKET, SO_TIMESTAMPNS, stamp)], flags, address
 
 
 class Line:
@@ -81,3 +92,21 @@ async def test_a_burst_after_frames_that_came_alone_is_taken_in_a_few_turns_and_
     burst = range(0x100, 0x164)
     await line.hear(*burst)
     assert line.came[2:] == list(burst)
+
+
+def stand_still(seconds: float) -> None:
+    """Keep this process from its event loop."""
+    time.sleep(seconds)
+
+
+async def test_what_waited_while_the_process_stood_still_is_heard_before_any_timer_of_the_pause(line: Line) -> None:
+    await line.hear(0x181)
+    await line.hear(0x181)
+    heard_at_time_out: list[int] = []
+    asyncio.get_running_loop().call_later(0.005, lambda: heard_at_time_out.append(len(line.came) - 2))
+    line.near.age_s = 0.1
+    for can_id in range(0x100, 0x164):
+        line.far.send(make_frame(can_id, b""))
+    stand_still(0.01)
+    await line.hear()
+    assert heard_at_time_out == [100]
