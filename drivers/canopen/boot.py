@@ -151,9 +151,11 @@ class NodeBoot:
         self._gone.clear()
         device = self._device
         device.node_state = NodeState.CONFIGURING
+        loop, limit_s = asyncio.get_running_loop(), self._master.network.boot_deadline_s
+        await self._take_steps(device.urgent_steps(), loop.time() + limit_s)
         device.status_sentence = f"{self._who}: waiting until other nodes are configured"
         async with self._master.pacing.turns:
-            deadline_s = asyncio.get_running_loop().time() + self._master.network.boot_deadline_s
+            deadline_s = loop.time() + limit_s
             await self._take_steps(device.boot_steps(), deadline_s)
         start = Step("starting it", self._start)
         guard = Step("waiting for its first guarding answer", self._first_guarding_answer)

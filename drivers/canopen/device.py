@@ -58,6 +58,10 @@ class CanopenDevice(ABC):
     def boot_steps(self) -> tuple[Step, ...]:
         """The steps of one attempt to configure it, in pre-operational."""
 
+    def urgent_steps(self) -> tuple[Step, ...]:
+        """Steps of the next attempt that wait neither for other nodes nor for anything else."""
+        return ()
+
     @abstractmethod
     def start_steps(self) -> tuple[Step, ...]:
         """The steps after it was started and guarded, before it counts as ready."""

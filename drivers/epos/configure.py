@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Awaitable, Callable
+from typing import TypeVar
 
-from canhelm.errors import DeviceFault, Refused
+from canhelm.errors import CanhelmError, DeviceFault, Refused
+from drivers.canopen.codes import NmtCommand
 from drivers.canopen.configuration import Configuration
 from drivers.canopen.device import Step
 from drivers.canopen.master import Master
@@ -19,6 +22,8 @@ from drivers.epos.outputs import OutputBits
 from drivers.epos.parameters import guarding_plan, parameter_plan, pdo_plan, start_up_plan
 from drivers.epos.state_machine import Command, state_of
 from profiles.schema import DriveConfig
+
+T = TypeVar("T")
 
 DEVICE_TYPE = 0x0020_0192
 VENDOR_MAXON = 0xFB
@@ -56,6 +61,7 @@ class EposSetup:
         stop_input: EmergencyStopInput | None,
     ) -> None:
         self._config = config
+        self._master = master
         self._network = master.network
         self._sdo = sdo
         self._who = who
@@ -70,11 +76,15 @@ class EposSetup:
         start_up = dict(start_up_plan(self._config))
         return {OBJECTS["software_version"]: self._firmware} | start_up | self._written.written
 
+    def stop_step(self) -> Step:
+        """Stops the drive and switches it off."""
+        return Step("stopping it", self._stop)
+
     def steps(self) -> tuple[Step, ...]:
         """The steps in their order."""
         return (
             Step("checking its identity", self._check_identity),
-            Step("stopping it", self._stop),
+            self.stop_step(),
             Step("clearing its errors", self._clear_errors),
             Step("setting up guarding", self._write_guarding),
             Step("mapping its PDOs", self._write_pdos),
@@ -104,16 +114,24 @@ class EposSetup:
     async def _stop(self) -> None:
         """A drive that still turns is brought to rest by its ramp, then off; only then it needs no life guarding.
 
-        Until it says that it is off, nothing but its life guarding stops it where it can be told no more.
+        Until it says that it is off, nothing but its life guarding stops it where it can be told no more; and one whose
+        communication was reset has none. So its node is restarted where it does not do as it is told.
         """
-        if await self._is_powered():
-            await self._sdo.write(OBJECTS["controlword"], Command.QUICK_STOP)
-            await asyncio.sleep(self._config.max_speed_m_s / self._config.quick_stop_m_s2)
-        await self._sdo.write(OBJECTS["controlword"], Command.DISABLE_VOLTAGE)
-        if await self._is_powered():
-            remedy = "its life guarding stops it, and it is tried again; if it stays so, switch its supply off and on"
-            raise DeviceFault(f"{self._who} does not switch off", node=self._sdo.node, remedy=remedy)
+        try:
+            await self._switch_off()
+        except CanhelmError:
+            self._master.send_nmt(NmtCommand.RESET_NODE, self._sdo.node)
+            raise
         await self._written.write(((OBJECTS["life_time_factor"], 0), (OBJECTS["guard_time"], 0)))
+
+    async def _switch_off(self) -> None:
+        if await _twice(self._is_powered):
+            await _twice(lambda: self._sdo.write(OBJECTS["controlword"], Command.QUICK_STOP))
+            await asyncio.sleep(self._config.max_speed_m_s / self._config.quick_stop_m_s2)
+        await _twice(lambda: self._sdo.write(OBJECTS["controlword"], Command.DISABLE_VOLTAGE))
+        if await _twice(self._is_powered):
+            remedy = "its node is restarted, and it is tried again; if it stays so, switch its supply off and on"
+            raise DeviceFault(f"{self._who} does not switch off", node=self._sdo.node, remedy=remedy)
 
     async def _is_powered(self) -> bool:
         """Whether its power stage is on, or it does not say so plainly."""
@@ -168,6 +186,14 @@ class EposSetup:
         await self._written.expect(
             OBJECTS["mode_of_operation_display"], mode, "switch the drive off and on; see 0x6502 for its modes"
         )
+
+
+async def _twice(request: Callable[[], Awaitable[T]]) -> T:
+    """A request's answer; it is made once more where there is none, or a refusal."""
+    try:
+        return await request()
+    except CanhelmError:
+        return await request()
 
 
 def emergency_words(code: int) -> tuple[str, str]:

@@ -77,6 +77,7 @@ class EposDrive(CanopenDevice):
         self._rpm_per_m_s, self._top_speed_m_s = self._units.rpm_per_m_s, config.max_speed_m_s
         self._travel = Travel(self._units, config.max_speed_m_s)
         self._setup: EposSetup | None = None
+        self._was_ready = False
         self._target_rpm = 0
         self._controlword = int(Command.DISABLE_VOLTAGE)
         self._rpdo1, self._rpdo3 = rpdo_cob_id(1, config.node), rpdo_cob_id(3, config.node)
@@ -325,8 +326,16 @@ class EposDrive(CanopenDevice):
 
     def boot_steps(self) -> tuple[Step, ...]:
         """Configuration in pre-operational; see :class:`drivers.epos.configure.EposSetup`."""
-        self._setup = EposSetup(self.config, self.master, self.sdo, self.who, self.outputs, self._stop_input)
+        self._setup = self._make_setup()
         return self._setup.steps()
+
+    def urgent_steps(self) -> tuple[Step, ...]:
+        """One that was ready may still turn, and has no life guarding where its communication was reset."""
+        was_ready, self._was_ready = self._was_ready, False
+        return (self._make_setup().stop_step(),) if was_ready else ()
+
+    def _make_setup(self) -> EposSetup:
+        return EposSetup(self.config, self.master, self.sdo, self.who, self.outputs, self._stop_input)
 
     @property
     def confirmed(self) -> dict[ObjectDef, int]:
@@ -346,6 +355,7 @@ class EposDrive(CanopenDevice):
 
     def on_ready(self) -> None:
         """Configured: in its driving mode, disabled, all targets zero; a fault is gone unless it still shows it."""
+        self._was_ready = True
         self.mode = self.driving_mode
         self._stand_down()
         if self.state is not DriveState.FAULT:

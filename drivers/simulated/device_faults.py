@@ -91,6 +91,11 @@ def _node_reset(site: Site, fault: Fault, _: Random) -> Effect:
     return Effect(lambda: node.restart() if node.powered else None)
 
 
+def _communication_reset(site: Site, fault: Fault, _: Random) -> Effect:
+    node = _node_of(site, fault)
+    return Effect(lambda: node.reset_communication() if node.powered else None)
+
+
 def _power_cycle(site: Site, fault: Fault, _: Random) -> Effect:
     node, had_power = _node_of(site, fault), False
 
@@ -339,6 +344,7 @@ def _brick_lost(site: Site, fault: Fault, _: Random) -> Effect:
 
 MAKERS: dict[str, Maker] = {
     "node_reset": _node_reset,
+    "communication_reset": _communication_reset,
     "power_cycle": _power_cycle,
     "babbling": _babbling,
     "wrong_identity": _wrong_identity,

@@ -98,6 +98,7 @@ class SimulatedNode:
         self._handlers: dict[int, Handler] = {}
         self._guarding = GuardedSide(self._life_time_s, self._on_master_lost)
         self._boot_timer: asyncio.TimerHandle | None = None
+        self._starting = False
         self._held_emergency: bytes | None = None
         self._describe_objects()
         port.connected = False
@@ -155,6 +156,7 @@ class SimulatedNode:
         self.dictionary.restart()
         self.error_register = 0
         self.error_history.clear()
+        self._starting = True
         self._boot_timer = asyncio.get_running_loop().call_later(self.boot_delay_s, self._boot, True)
 
     def _halt(self) -> None:
@@ -172,7 +174,9 @@ class SimulatedNode:
         self._enter(NmtState.BOOT_UP)
 
     def reset_communication(self) -> None:
-        """Start the communication anew, as NMT reset communication does."""
+        """Start the communication anew, as NMT reset communication does; a node that is starting does so anyway."""
+        if self._starting:
+            return
         self._stop_communication()
         self.before_start(False)
         self.dictionary.restart(communication_only=True)
@@ -182,6 +186,7 @@ class SimulatedNode:
     def _boot(self, whole: bool) -> None:
         self._boot_timer = None
         if whole:
+            self._starting = False
             self.application_started()
         if self.node_id > _HIGHEST_NODE_ID:
             self._listen()

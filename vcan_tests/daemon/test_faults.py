@@ -25,6 +25,8 @@ TOLD_S, SILENT_S, GUARDED_S = 0.011, 0.071, 0.19
 answer."""
 LIFE_TIME_S, SWING_S = 0.3, 0.05
 """Until a drive that hears nothing begins its ramp by itself; and what a wheel swings after it."""
+OFF_OTHERWISE_S = 2.5
+"""Until a drive is off that has to be told by SDO, or restarted: its ramp from full speed, and requests in vain."""
 RAMP_S = 0.4 / min(drive.quick_stop_m_s2 for drive in MAX2D.drives.values())
 
 
@@ -48,6 +50,8 @@ STOPS: list[tuple[dict[str, Any], str, float]] = [
     ({"kind": "pdo_long", "part": "front"}, "node 6 (front) is silent", SILENT_S),
     ({"kind": "node_reset", "part": "front_left"}, "node 3 (front_left)", SILENT_S),
     ({"kind": "node_reset", "part": "front"}, "node 6 (front)", SILENT_S),
+    ({"kind": "communication_reset", "part": "front_left"}, "node 3 (front_left)", SILENT_S),
+    ({"kind": "communication_reset", "part": "front"}, "node 6 (front)", SILENT_S),
     ({"kind": "power_cycle", "part": "front_left"}, "node 3 (front_left)", SILENT_S),
     ({"kind": "silence", "part": "front_left"}, "node 3 (front_left) is silent", SILENT_S),
     ({"kind": "silence", "part": "front"}, "node 6 (front) is silent", SILENT_S),
@@ -154,6 +158,39 @@ async def test_a_drive_that_can_be_told_nothing_is_switched_off_by_restarting_it
         await robot.until(lambda: not robot.network.drives["front_left"].motion.powered, 0.1)
         told = [event["message"] for event in robot.app.supervisor.log.events]
         assert "node 3 (front_left) does not follow its PDOs and was switched off by restarting its node" in told
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        {"kind": "sdo_abort", "object": "0x6040"},
+        {"kind": "sdo_timeout", "object": "0x6040"},
+        {"kind": "sdo_abort", "object": "0x6041"},
+        {"kind": "sdo_abort", "object": "0x1018/1"},
+    ],
+    ids=lambda fault: " ".join(fault.values()),
+)
+async def test_a_drive_that_has_forgotten_its_guarding_is_switched_off_though_it_refuses_requests(
+    fault: dict[str, Any],
+) -> None:
+    async with _struck(part="front_left", **fault) as (robot, driving):
+        await robot.call("simulation.fault", kind="communication_reset", part="front_left")
+        await robot.until(lambda: not robot.network.drives["front_left"].motion.powered, OFF_OTHERWISE_S)
+        await driving
+        await robot.call("simulation.clear_faults")
+        await robot.until(lambda: all(device.node_state == "ready" for device in robot.app.devices.all))
+        assert (await robot.call("reset"))["state"] == "idle"
+
+
+async def test_drives_that_have_all_forgotten_their_guarding_are_stopped_at_once_and_not_one_after_the_other() -> None:
+    async with _struck(kind="communication_reset", part="front") as (robot, driving):
+        robot.app.master.pacing.turns = asyncio.Semaphore(1)
+        for part in ("rear", "rear_right", "rear_left", "front_left", "front_right"):
+            await robot.call("simulation.fault", kind="communication_reset", part=part)
+        await robot.until(lambda: robot.fastest_wheel_m_s < 0.01, SILENT_S + RAMP_S + SWING_S)
+        await driving
+        await robot.until(lambda: not any(drive.motion.powered for drive in robot.network.drives.values()), 2.5)
+        await robot.until(lambda: all(device.node_state == "ready" for device in robot.app.devices.all))
 
 
 @pytest.mark.parametrize(

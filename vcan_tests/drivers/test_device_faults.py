@@ -9,6 +9,7 @@ import msgspec
 import pytest
 
 from canhelm.errors import UsageError
+from drivers.epos.state_machine import State
 from drivers.simulated.bus import SimulatedBus
 from drivers.simulated.device_faults import Site
 from drivers.simulated.faults import Faults
@@ -66,6 +67,15 @@ async def test_a_power_cycle_gives_no_power_to_a_node_that_had_none() -> None:
     robot.set("power_cycle", for_s=0.5)
     await asyncio.sleep(1.0)
     assert not robot.network.drives[PART].powered
+
+
+async def test_a_communication_that_is_reset_while_its_node_starts_does_not_keep_it_from_starting() -> None:
+    robot = Robot()
+    robot.network.power_off(PART)
+    robot.network.power_on(PART)
+    robot.set("communication_reset")
+    await asyncio.sleep(1.0)
+    assert robot.network.drives[PART].control.state is State.SWITCH_ON_DISABLED
 
 
 @pytest.mark.parametrize(

@@ -78,6 +78,7 @@ STRIKES: Final[dict[str, Strike]] = {
     "sdo_abort-on": Strike("cycle", "sdo_abort"),
     "sdo_timeout-on": Strike("cycle", "sdo_timeout"),
     "node_reset": Strike("cycle", "node_reset", reach="life", silences=True),
+    "communication_reset": Strike("cycle", "communication_reset", reach="sdo", silences=True),
     "power_cycle": Strike("cycle", "power_cycle", {"for_s": 0.3}, reach="life", silences=True),
     "silence": Strike("cycle", "silence", reach="life", silences=True),
     "babbling": Strike("cycle", "babbling", {"for_s": 0.5}, reach="life", silences=True),
