@@ -175,7 +175,7 @@ def test_a_life_of_a_minute_is_good(tmp_path: Path) -> None:
     life = lived_for_real(tmp_path / "minute", 1.0 / 60.0)
     assert life.defects == []
     assert life.samples[-1].time_s >= 60.0
-    assert life.counts["fault"] >= 2
+    assert life.counts["fault"] >= 1
     assert (tmp_path / "minute" / LOGS).is_dir()
     assert (tmp_path / "minute" / RUNS).is_dir()
 

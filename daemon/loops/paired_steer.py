@@ -193,10 +193,15 @@ class PairedSteerLaw:
             self._fail(str(refusal))
 
     def _redirect(self, pair: int) -> None:
-        """Let the pair that is being turned follow the new target, unless it is as good as the old one."""
+        """Let the pair that is being turned follow the new target, unless it is as good as the old one.
+
+        One whose brake is only being released is left alone where nobody wants it turned any more.
+        """
         wanted = self._wanted_heading(pair)
         if wanted is None or self._goal_rad is None or not abs(wanted - self._goal_rad) <= self._threshold_rad():
             self._goal_rad = wanted
+        if wanted is None and self._phase is Phase.RELEASING_BRAKE:
+            self._enter(Phase.ENGAGING_BRAKE)
 
     def _may_roll_on(self) -> bool:
         """Whether the new motion goes on from the rolling one without new headings."""

@@ -259,7 +259,6 @@ class SdoClient:
         try:
             return await self._exchange(request, kind, toggle, timeout_s)
         except NodeAbsent:
-            self._abort(ABORT_TIMEOUT)
             raise self._error(Timeout, "stopped answering in the middle of a transfer", "try again") from None
         except asyncio.CancelledError:
             self._abort(ABORT_TIMEOUT)
@@ -310,6 +309,9 @@ class SdoClient:
             self._channel.end(reason)
 
     def _expire(self, waiter: asyncio.Future[SdoAnswer], timeout_s: float) -> None:
+        """End what the server may have begun: one that has understood something else waits for more, and is deaf."""
+        if not waiter.done():
+            self._abort(ABORT_TIMEOUT)
         self._fail(waiter, f"did not answer within {timeout_s * 1e3:.0f} ms")
 
     def _fail(self, waiter: asyncio.Future[SdoAnswer], reason: str) -> None:

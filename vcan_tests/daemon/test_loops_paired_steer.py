@@ -156,6 +156,18 @@ def test_without_a_target_a_turning_pair_stops_and_is_locked(law: PairedSteerLaw
     assert 2 < headings_deg(robot)[1] < 70
 
 
+def test_without_a_target_a_brake_that_is_being_released_engages_at_once(
+    law: PairedSteerLaw, robot: PairedRobot
+) -> None:
+    target = steer_target(1, math.radians(80))
+    while not 0 < robot.brake[1] < 1:
+        drive(law, robot, target, at_most_s=DT)
+    steps = drive(law, robot, None)
+    assert phases(steps) == [(Phase.ENGAGING_BRAKE, "front"), (Phase.STOPPING, None), (Phase.RESTING, None)]
+    assert not any(any(step.command.release_brake) for step in steps)
+    assert headings_deg(robot) == [0.0, 0.0]
+
+
 def test_a_new_speed_is_taken_up_at_once(law: PairedSteerLaw, robot: PairedRobot) -> None:
     drive(law, robot, direction_target(0, 0.3), at_most_s=2)
     steps = drive(law, robot, direction_target(0, 0.6), at_most_s=1)

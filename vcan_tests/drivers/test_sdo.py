@@ -191,6 +191,13 @@ async def test_answers_that_stop_midway_time_out_and_the_transfer_is_aborted() -
     assert server.requests[-1] == make_abort(0x1008, 0, 0x05040000)
 
 
+async def test_a_request_without_any_answer_is_aborted_since_the_server_may_have_understood_another_one() -> None:
+    server = Server()
+    with pytest.raises(NodeAbsent):
+        await server.client.read(STATUSWORD)
+    assert server.requests == [make_upload(0x6041, 0), make_abort(0x6041, 0, 0x05040000)]
+
+
 async def test_two_calls_at_once_wait_for_each_other() -> None:
     server = Server()
 

@@ -110,6 +110,8 @@ class Judge:
         if self.wild:
             rest_s += limits.overrun_s + limits.off_s
         off_s = limits.off_s if self.reach == "pdo" else limits.off_otherwise_s
+        if slowing_m_s2 is not None:
+            off_s += limits.settled_s
         self._rest_by_s = max(self._rest_by_s, now_s + rest_s)
         self._off_by_s = max(self._off_by_s, self._rest_by_s + off_s)
         self._rested_m = None

@@ -9,6 +9,7 @@ from typing import Final
 from daemon.campaigns.faults.strikes import Reach
 from daemon.loops.plausibility import WHEELS_SHARE
 from daemon.loops.plausibility_limits import encoder_rates_rad_s, turning_limits_rad
+from daemon.loops.steering import SETTLE_TIME_S
 from daemon.runtime.rest import AT_REST_CYCLES, AT_REST_M_S
 from daemon.runtime.stopping import OVERRUN_S
 from daemon.runtime.watch import SILENT_CYCLES
@@ -52,6 +53,8 @@ class Limits:
         reach_s: until a drive begins its ramp after a stop was commanded, or its master was lost.
         off_s: from rest until every drive is off.
         overrun_s: until a wheel that goes on after its ramp is switched off (``daemon/runtime/stopping.py``).
+        settled_s: as long drives keep the wheels at rest before they are switched off, after a stop by the motion's own
+            ramp (``SETTLE_TIME_S`` of ``daemon/loops/steering.py``).
         off_otherwise_s: from rest until drives are off of which one is silent, so that it is waited for as long, or has
             to be told by SDO.
         braked_s: until a released brake has engaged, once its drive can be told.
@@ -73,6 +76,7 @@ class Limits:
     reach_s: dict[Reach, float]
     off_s: float
     overrun_s: float
+    settled_s: float
     off_otherwise_s: float
     braked_s: float
     ready_s: float
@@ -108,6 +112,7 @@ def limits_of(profile: Profile) -> Limits:
         reach_s={"pdo": 2.0 * cycle_s, "sdo": (INSIST_CYCLES + 2) * cycle_s, "life": life_s + cycle_s},
         off_s=off_s,
         overrun_s=OVERRUN_S,
+        settled_s=SETTLE_TIME_S,
         off_otherwise_s=off_s + OVERRUN_S + TRANSITION_S + network.sdo_timeout_s,
         braked_s=max(brake.close_time_s for brake in profile.brakes.values()) + network.sdo_timeout_s,
         ready_s=2.0 * network.boot_deadline_s,
